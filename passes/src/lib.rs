@@ -1,0 +1,19 @@
+//! The passes of lodc, the level-of-detail compiler for shaders.
+//!
+//! A [`Shader`] is a valid naga module in normal form. A [`Pass`] lists [`Candidate`]s,
+//! simplifications that could be made, and makes one. A [`Recipe`] is a list of candidates, and
+//! replays to the same module always. Every pass moves a value to a cheaper rate, or removes it.
+//! This crate reads no files, starts no threads and knows no GPU.
+
+pub mod cost;
+pub mod facts;
+pub mod recipe;
+pub mod shader;
+
+pub use cost::Work;
+pub use facts::Facts;
+pub use recipe::{Candidate, Class, Declined, Pass, Recipe, ReplayError};
+pub use shader::{Fingerprint, Shader, Stage, ValueId};
+
+/// Every pass, in the order in which candidates are listed.
+pub static PASSES: &[&dyn Pass] = &[];

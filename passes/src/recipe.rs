@@ -1,0 +1,122 @@
+//! Candidates and recipes: one simplification as data, and an ordered list of them.
+
+use crate::shader::{Shader, ValueId};
+use crate::{Facts, PASSES};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What a simplification may change (Olano, section 2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// Never changes the picture.
+    Lossless,
+    /// Changes nothing at the resolution that it was made for.
+    ResolutionLossless,
+    /// Changes the picture; the error is measured.
+    Lossy,
+}
+
+/// One simplification that could be made: pass, site, choice, and the numbers that it bakes.
+/// Pure data: it serialises, compares and holds no handle.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Candidate {
+    /// The pass's command-line name.
+    pub pass: String,
+    /// The value that is changed, or whose users are.
+    pub site: ValueId,
+    /// What is done there, in the pass's own words: `mean`, `keep fs_main.specular.pow`.
+    pub choice: String,
+    /// The numbers that it bakes, as the bits of an f32 each; empty when it bakes none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub value: Vec<u32>,
+}
+
+impl Candidate {
+    /// The numbers that it bakes.
+    pub fn numbers(&self) -> impl Iterator<Item = f32> + '_ {
+        self.value.iter().map(|bits| f32::from_bits(*bits))
+    }
+}
+
+impl fmt::Display for Candidate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} {}", self.pass, self.site.path(), self.choice)?;
+        let mut sep = " = ";
+        for number in self.numbers() {
+            write!(f, "{sep}{number}")?;
+            sep = ", ";
+        }
+        Ok(())
+    }
+}
+
+/// Why a candidate does not apply: one lower-case sentence without a full stop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Declined(pub String);
+
+/// A pass: it lists candidates, and makes the change that one describes.
+///
+/// The candidate law: `candidates` is deterministic; `applies` can be asked of any shader;
+/// `apply` after `applies` gives a valid module, and panics on anything else.
+pub trait Pass: Sync {
+    /// The command-line name, the same as that of the file and of the fixture folder.
+    fn name(&self) -> &'static str;
+    /// What it does, in one line.
+    fn summary(&self) -> &'static str;
+    /// What a candidate of this pass may change.
+    fn class(&self, candidate: &Candidate) -> Class;
+    /// Every change that this pass could make, in a fixed order.
+    fn candidates(&self, shader: &Shader, facts: &Facts) -> Vec<Candidate>;
+    /// Whether a candidate can be applied to a shader.
+    fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined>;
+    /// The shader with the change made.
+    fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader;
+}
+
+/// An ordered list of candidates: a variant's derivation.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Recipe(pub Vec<Candidate>);
+
+/// A candidate of a recipe that could not be applied.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReplayError {
+    /// Its place in the recipe, from 0.
+    pub step: usize,
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Why it did not apply.
+    pub declined: Declined,
+}
+
+impl Recipe {
+    /// Applies every candidate in order.
+    ///
+    /// # Errors
+    /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
+    pub fn replay(&self, base: &Shader) -> Result<Shader, ReplayError> {
+        let mut shader = base.clone();
+        for (step, candidate) in self.0.iter().enumerate() {
+            shader = apply(&shader, candidate).map_err(|declined| ReplayError {
+                step,
+                candidate: candidate.clone(),
+                declined,
+            })?;
+        }
+        Ok(shader)
+    }
+}
+
+/// Applies one candidate through the pass that it names.
+///
+/// # Errors
+/// When no pass has that name, or the pass declines.
+pub fn apply(shader: &Shader, candidate: &Candidate) -> Result<Shader, Declined> {
+    let pass = PASSES
+        .iter()
+        .find(|pass| pass.name() == candidate.pass)
+        .ok_or_else(|| Declined(format!("there is no pass `{}`", candidate.pass)))?;
+    pass.applies(shader, candidate)?;
+    Ok(pass.apply(shader, candidate))
+}

@@ -1,0 +1,170 @@
+//! A [`Shader`]: a valid naga module in normal form, with a stable [`ValueId`] for every value.
+//!
+//! Normal form is made by [`crate::normalize`] and changed only by [`crate::edit`].
+//! The module holds the chosen entry points and no other function.
+
+use naga::{EntryPoint, Expression, Function, Handle, Module, ShaderStage};
+use serde::{Deserialize, Serialize};
+use std::{fmt, sync::Arc};
+
+/// The stages whose values a [`Shader`] names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// The vertex entry point.
+    Vertex,
+    /// The fragment entry point.
+    Fragment,
+}
+
+/// The stable name of a value: a path from the nearest named value, such as
+/// `fs_main.specular.pow`, and a hash of how the value is computed as second key.
+///
+/// It is the same on every run, and survives edits of unrelated lines and most renames.
+/// The text form is `path` alone, or `path#hash` with the hash as 16 hexadecimal digits.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ValueId {
+    path: Arc<str>,
+    hash: u64,
+}
+
+impl ValueId {
+    /// An id from its path and structural hash. A hash of 0 means that it is not known.
+    pub fn new(path: impl Into<Arc<str>>, hash: u64) -> Self {
+        Self {
+            path: path.into(),
+            hash,
+        }
+    }
+
+    /// The readable part, `fs_main.specular.pow`.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The structural hash, 0 when it is not known.
+    pub fn hash(&self) -> u64 {
+        self.hash
+    }
+}
+
+impl fmt::Display for ValueId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.hash == 0 {
+            write!(f, "{}", self.path)
+        } else {
+            write!(f, "{}#{:016x}", self.path, self.hash)
+        }
+    }
+}
+
+impl From<&str> for ValueId {
+    fn from(text: &str) -> Self {
+        match text.rsplit_once('#') {
+            Some((path, hash)) if hash.len() == 16 => match u64::from_str_radix(hash, 16) {
+                Ok(hash) => Self::new(path, hash),
+                Err(_) => Self::new(text, 0),
+            },
+            _ => Self::new(text, 0),
+        }
+    }
+}
+
+impl Serialize for ValueId {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for ValueId {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = std::borrow::Cow::<str>::deserialize(deserializer)?;
+        Ok(Self::from(&*text))
+    }
+}
+
+/// The identity of a shader: a hash of its normal form. Names, spans and the order of unused
+/// arena entries do not enter it, so two orders of the same edits count once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Fingerprint(pub [u8; 16]);
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// A valid naga module in normal form, with a [`ValueId`] for every expression of its entry points.
+#[derive(Clone, Debug)]
+pub struct Shader {
+    pub(crate) module: Module,
+    /// For each entry point of `module`, the id of each expression, in arena order.
+    pub(crate) ids: Vec<Vec<ValueId>>,
+}
+
+impl Shader {
+    /// The module. It holds a fragment entry point, a vertex entry point or not, and no functions.
+    pub fn module(&self) -> &Module {
+        &self.module
+    }
+
+    /// The entry point of a stage; the fragment stage is always there.
+    pub fn entry_point(&self, stage: Stage) -> Option<&EntryPoint> {
+        self.index(stage).map(|i| &self.module.entry_points[i])
+    }
+
+    /// The function of a stage's entry point.
+    pub fn function(&self, stage: Stage) -> Option<&Function> {
+        self.entry_point(stage).map(|e| &e.function)
+    }
+
+    /// The place of a stage's entry point in `module().entry_points`.
+    pub fn index(&self, stage: Stage) -> Option<usize> {
+        let wanted = match stage {
+            Stage::Vertex => ShaderStage::Vertex,
+            Stage::Fragment => ShaderStage::Fragment,
+        };
+        self.module
+            .entry_points
+            .iter()
+            .position(|e| e.stage == wanted)
+    }
+
+    /// The id of an expression of a stage's entry point.
+    ///
+    /// # Panics
+    /// When the shader lacks the stage or the handle is not of its function.
+    pub fn id(&self, stage: Stage, value: Handle<Expression>) -> &ValueId {
+        let entry = self.index(stage).expect("the shader has this stage");
+        &self.ids[entry][value.index()]
+    }
+
+    /// Where a value is: by path and hash, else by path alone, else by a hash that only one value has.
+    pub fn find(&self, id: &ValueId) -> Option<(Stage, Handle<Expression>)> {
+        let all = || {
+            [Stage::Vertex, Stage::Fragment]
+                .into_iter()
+                .filter_map(|stage| Some((stage, self.index(stage)?)))
+                .flat_map(move |(stage, entry)| {
+                    self.module.entry_points[entry]
+                        .function
+                        .expressions
+                        .iter()
+                        .map(move |(handle, _)| (stage, handle, &self.ids[entry][handle.index()]))
+                })
+        };
+        let by_path = all().find(|(_, _, have)| have.path == id.path);
+        let found = match by_path {
+            Some(found) => Some(found),
+            None if id.hash != 0 => {
+                let mut with_hash = all().filter(|(_, _, have)| have.hash == id.hash);
+                match (with_hash.next(), with_hash.next()) {
+                    (Some(only), None) => Some(only),
+                    _ => None,
+                }
+            }
+            None => None,
+        };
+        found.map(|(stage, handle, _)| (stage, handle))
+    }
+}

@@ -1,0 +1,1 @@
+//! Draws a frame: rasterises once, shades as often as there are variants.

@@ -1,0 +1,1 @@
+//! Pictures: sRGB encoding, box filter, PNG files.

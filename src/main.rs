@@ -1,0 +1,3 @@
+//! The command-line tool: a thin shell around the library.
+
+fn main() {}
