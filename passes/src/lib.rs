@@ -7,6 +7,7 @@
 
 pub mod cost;
 pub mod facts;
+pub mod operands;
 pub mod recipe;
 pub mod shader;
 
