@@ -1,0 +1,171 @@
+//! The outside judges: Tint, the compiler of Chromium, sees WGSL, and `spirv-val` sees SPIR-V.
+//!
+//! Both come from `.ci/run`. Where one is missing its tests say `SKIPPED` aloud, and fail when `CI` is set,
+//! so that a machine that lost it cannot pass in silence.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The repository.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Names and texts of the `.wgsl` files of a folder under `testdata/`, in the order of their names.
+fn shaders(folder: &str) -> Vec<(String, String)> {
+    let folder = root().join("testdata").join(folder);
+    let mut paths: Vec<PathBuf> = fs::read_dir(&folder)
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .map(|entry| entry.expect("a readable folder").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
+        .collect();
+    paths.sort();
+    assert!(!paths.is_empty(), "no shaders in {}", folder.display());
+    paths
+        .into_iter()
+        .map(|path| {
+            let name = path.file_stem().expect("a file").to_string_lossy();
+            (
+                name.into_owned(),
+                fs::read_to_string(&path).expect("a text file"),
+            )
+        })
+        .collect()
+}
+
+/// A fresh folder for files that a judge reads.
+fn scratch(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a writable target folder");
+    folder
+}
+
+/// Says that a judge is missing; in CI that is a failure.
+fn skipped(judge: &str) {
+    assert!(
+        std::env::var_os("CI").is_none(),
+        "{judge} is missing; .ci/run installs it"
+    );
+    println!("SKIPPED: {judge} is missing; .ci/run installs it");
+}
+
+/// Shows named WGSL texts to Tint. Its errors, one a line; `None` where Tint is not installed.
+fn tint(test: &str, texts: &[(String, String)]) -> Option<Vec<String>> {
+    let judge = root().join("tests/tint");
+    let node = Command::new("node").arg("--version").output();
+    if !judge.join("node_modules/webgpu").is_dir() || node.is_err() {
+        skipped("Tint (npm package webgpu, and node)");
+        return None;
+    }
+    let folder = scratch(test);
+    let mut command = Command::new("node");
+    command.arg(judge.join("check.mjs")).current_dir(&folder);
+    for (name, text) in texts {
+        let file = format!("{name}.wgsl");
+        fs::write(folder.join(&file), text).expect("a writable target folder");
+        command.arg(file);
+    }
+    let output = command.output().expect("node starts");
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    let mut lines: Vec<String> = stdout.lines().map(str::to_owned).collect();
+    assert_eq!(
+        lines.pop(),
+        Some(format!("checked {}", texts.len())),
+        "Tint did not finish: {}{}",
+        stdout,
+        String::from_utf8_lossy(&output.stderr),
+    );
+    Some(lines)
+}
+
+/// Shows a named SPIR-V module to `spirv-val`. Its complaint, empty if there is none; `None` where it is not installed.
+fn spirv_val(test: &str, name: &str, words: &[u32]) -> Option<String> {
+    let file = scratch(&format!("{test}-{name}")).join("module.spv");
+    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    fs::write(&file, bytes).expect("a writable target folder");
+    let Ok(output) = Command::new("spirv-val")
+        .args(["--target-env", "vulkan1.1"])
+        .arg(&file)
+        .output()
+    else {
+        skipped("spirv-val (Debian package spirv-tools)");
+        return None;
+    };
+    if output.status.success() {
+        return Some(String::new());
+    }
+    let complaint = [output.stdout, output.stderr].concat();
+    Some(format!(
+        "{name}: {}",
+        String::from_utf8_lossy(&complaint).trim()
+    ))
+}
+
+/// Parses and validates WGSL with naga, which is what lodc itself uses.
+fn validated(name: &str, text: &str) -> (naga::Module, naga::valid::ModuleInfo) {
+    let module = naga::front::wgsl::parse_str(text)
+        .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(text, name)));
+    let info = naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::default(),
+    )
+    .validate(&module)
+    .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(text, name)));
+    (module, info)
+}
+
+/// The SPIR-V of a valid module.
+fn spirv(module: &naga::Module, info: &naga::valid::ModuleInfo) -> Vec<u32> {
+    naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), None)
+        .expect("naga writes SPIR-V of what it validated")
+}
+
+/// Uniform control flow is what Tint checks and naga does not: if this passes, Tint is not looking.
+#[test]
+fn tint_refuses_a_sample_under_a_varying_branch() {
+    let bad = "@group(0) @binding(0) var t: texture_2d<f32>;
+@group(0) @binding(1) var s: sampler;
+@fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {
+    if uv.x > 0.5 { return textureSample(t, s, uv); }
+    return vec4f(1.0);
+}";
+    validated("bad", bad);
+    let texts = [
+        ("bad".to_owned(), bad.to_owned()),
+        ("broken".to_owned(), "fn f( {".to_owned()),
+    ];
+    let Some(errors) = tint("tint_refuses", &texts) else {
+        return;
+    };
+    assert!(errors.len() >= 2, "{errors:#?}");
+    assert!(
+        errors[0].starts_with("bad.wgsl:4:") && errors[0].contains("uniform control flow"),
+        "{errors:#?}"
+    );
+    assert!(errors[1].starts_with("broken.wgsl:1:"), "{errors:#?}");
+}
+
+#[test]
+fn spirv_val_refuses_a_module_without_a_memory_model() {
+    // A header, and nothing else.
+    let words = [0x0723_0203, 0x0001_0300, 0, 1, 0];
+    if let Some(complaint) = spirv_val("spirv_val_refuses", "empty", &words) {
+        assert!(!complaint.is_empty());
+    }
+}
+
+#[test]
+fn judges_accept_the_materials() {
+    let texts = shaders("materials");
+    for (name, text) in &texts {
+        let (module, info) = validated(name, text);
+        if let Some(complaint) = spirv_val("materials", name, &spirv(&module, &info)) {
+            assert!(complaint.is_empty(), "{complaint}");
+        }
+    }
+    if let Some(errors) = tint("tint_materials", &texts) {
+        assert!(errors.is_empty(), "{errors:#?}");
+    }
+}
