@@ -42,7 +42,7 @@ fn halve(texels: &[[f32; 4]], size: &mut [usize; 3], axis: usize) -> Vec<[f32; 4
     for row in texels.chunks_exact(stride * n) {
         for x in 0..m {
             let taps = &row[2 * x * stride..];
-            if n % 2 == 0 {
+            if n.is_multiple_of(2) {
                 for i in 0..stride {
                     let (a, b) = (taps[i], taps[i + stride]);
                     out.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
