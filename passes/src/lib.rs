@@ -6,12 +6,16 @@
 //! This crate reads no files, starts no threads and knows no GPU.
 
 pub mod cost;
+pub mod edit;
 pub mod facts;
+mod fingerprint;
 pub mod operands;
+mod places;
 pub mod recipe;
 pub mod shader;
 
 pub use cost::Work;
+pub use edit::{Edit, New};
 pub use facts::Facts;
 pub use recipe::{Candidate, Class, Declined, Pass, Recipe, ReplayError};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};

@@ -3,9 +3,14 @@
 //! Normal form is made by [`crate::normalize`] and changed only by [`crate::edit`].
 //! The module holds the chosen entry points and no other function.
 
-use naga::{EntryPoint, Expression, Function, Handle, Module, ShaderStage};
+use crate::operands::User;
+use crate::places::Places;
+use naga::proc::{ResolveContext, TypeResolution};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{EntryPoint, Expression, Function, Handle, Module, ShaderStage, TypeInner, WithSpan};
 use serde::{Deserialize, Serialize};
-use std::{fmt, sync::Arc};
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 /// The stages whose values a [`Shader`] names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -100,9 +105,37 @@ pub struct Shader {
     pub(crate) module: Module,
     /// For each entry point of `module`, the id of each expression, in arena order.
     pub(crate) ids: Vec<Vec<ValueId>>,
+    /// For each entry point, what was found out about its function when first asked for.
+    known: Arc<Vec<Known>>,
+}
+
+/// What can be computed from a function alone.
+#[derive(Debug, Default)]
+struct Known {
+    types: OnceLock<Vec<TypeResolution>>,
+    places: OnceLock<Places>,
 }
 
 impl Shader {
+    /// A shader from its parts: a valid module in normal form, and for each of its entry points the
+    /// id of each expression.
+    pub(crate) fn new(module: Module, ids: Vec<Vec<ValueId>>) -> Self {
+        let lengths = module
+            .entry_points
+            .iter()
+            .map(|e| e.function.expressions.len());
+        assert!(
+            lengths.eq(ids.iter().map(Vec::len)),
+            "one id per expression"
+        );
+        let known = module.entry_points.iter().map(|_| Known::default());
+        Self {
+            known: Arc::new(known.collect()),
+            module,
+            ids,
+        }
+    }
+
     /// The module. It holds a fragment entry point, a vertex entry point or not, and no functions.
     pub fn module(&self) -> &Module {
         &self.module
@@ -130,13 +163,51 @@ impl Shader {
             .position(|e| e.stage == wanted)
     }
 
+    fn entry(&self, stage: Stage) -> usize {
+        self.index(stage).expect("the shader has this stage")
+    }
+
     /// The id of an expression of a stage's entry point.
     ///
     /// # Panics
     /// When the shader lacks the stage or the handle is not of its function.
     pub fn id(&self, stage: Stage, value: Handle<Expression>) -> &ValueId {
-        let entry = self.index(stage).expect("the shader has this stage");
-        &self.ids[entry][value.index()]
+        &self.ids[self.entry(stage)][value.index()]
+    }
+
+    /// The type of an expression of a stage's entry point.
+    ///
+    /// # Panics
+    /// When the shader lacks the stage or the handle is not of its function.
+    pub fn type_of(&self, stage: Stage, value: Handle<Expression>) -> &TypeInner {
+        self.types(stage)[value.index()].inner_with(&self.module.types)
+    }
+
+    /// The type of each expression of a stage's entry point, in arena order.
+    ///
+    /// # Panics
+    /// When the shader lacks the stage.
+    pub fn types(&self, stage: Stage) -> &[TypeResolution] {
+        let entry = self.entry(stage);
+        self.known[entry]
+            .types
+            .get_or_init(|| resolve(&self.module, &self.module.entry_points[entry].function))
+    }
+
+    /// Where the values of a stage's entry point are computed and read.
+    pub(crate) fn places(&self, stage: Stage) -> &Places {
+        let entry = self.entry(stage);
+        self.known[entry]
+            .places
+            .get_or_init(|| Places::of(&self.module.entry_points[entry].function))
+    }
+
+    /// What reads a value of a stage's entry point: expressions in arena order, then statements.
+    ///
+    /// # Panics
+    /// When the shader lacks the stage or the handle is not of its function.
+    pub fn users(&self, stage: Stage, value: Handle<Expression>) -> &[User] {
+        self.places(stage).users(value)
     }
 
     /// Where a value is: by path and hash, else by path alone, else by a hash that only one value has.
@@ -146,14 +217,16 @@ impl Shader {
                 .into_iter()
                 .filter_map(|stage| Some((stage, self.index(stage)?)))
                 .flat_map(move |(stage, entry)| {
-                    self.module.entry_points[entry]
-                        .function
-                        .expressions
-                        .iter()
-                        .map(move |(handle, _)| (stage, handle, &self.ids[entry][handle.index()]))
+                    let values = self.module.entry_points[entry].function.expressions.iter();
+                    let ids = self.ids[entry].iter();
+                    ids.zip(values)
+                        .map(move |(have, (handle, _))| (stage, handle, have))
                 })
         };
-        let by_path = all().find(|(_, _, have)| have.path == id.path);
+        // Paths are unique, so the first is the only one. Ids are passed around by reference count:
+        // most often the very same text is met.
+        let same = |have: &Arc<str>| Arc::ptr_eq(have, &id.path) || **have == *id.path;
+        let by_path = all().find(|(_, _, have)| same(&have.path));
         let found = match by_path {
             Some(found) => Some(found),
             None if id.hash != 0 => {
@@ -167,4 +240,35 @@ impl Shader {
         };
         found.map(|(stage, handle, _)| (stage, handle))
     }
+
+    /// Checks the module with naga's validator, every capability allowed.
+    ///
+    /// # Errors
+    /// When the module is not valid, which is a bug in what made it.
+    pub fn validate(&self) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+        Validator::new(ValidationFlags::all(), Capabilities::all())
+            .validate(&self.module)
+            .map_err(Box::new)
+    }
+
+    /// The identity of the shader: a hash of what its entry points do.
+    pub fn fingerprint(&self) -> Fingerprint {
+        crate::fingerprint::of(&self.module)
+    }
+}
+
+/// The types of a function's expressions.
+///
+/// # Panics
+/// When the function is not valid.
+pub(crate) fn resolve(module: &Module, function: &Function) -> Vec<TypeResolution> {
+    let context =
+        ResolveContext::with_locals(module, &function.local_variables, &function.arguments);
+    let mut types: Vec<TypeResolution> = Vec::with_capacity(function.expressions.len());
+    for (_, expression) in function.expressions.iter() {
+        let resolved = context.resolve(expression, |operand| Ok(&types[operand.index()]));
+        let resolved = resolved.expect("a valid function has types");
+        types.push(resolved);
+    }
+    types
 }
