@@ -1,0 +1,1 @@
+// Written when the shader was still whole: it must survive.

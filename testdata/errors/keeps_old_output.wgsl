@@ -1,0 +1,4 @@
+@fragment
+fn fs_main() -> @location(0) vec4f {
+    return vec4f(1.0)
+}

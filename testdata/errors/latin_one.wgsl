@@ -1,0 +1,2 @@
+// déjà vu
+@fragment fn fs_main() -> @location(0) vec4f { return vec4f(1.0); }
