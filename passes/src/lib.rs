@@ -9,16 +9,21 @@ pub mod cost;
 pub mod edit;
 pub mod facts;
 mod fingerprint;
+mod flow;
+pub mod op_removal;
 pub mod operands;
 mod places;
 pub mod recipe;
 pub mod shader;
+pub mod texture_removal;
 
 pub use cost::Work;
 pub use edit::{Edit, New};
 pub use facts::Facts;
-pub use recipe::{Candidate, Class, Declined, Pass, Recipe, ReplayError};
+pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
 /// Every pass, in the order in which candidates are listed.
-pub static PASSES: &[&dyn Pass] = &[];
+///
+/// Whole textures go first, because they are worth the most; then single operations.
+pub static PASSES: &[&dyn Pass] = &[&texture_removal::TextureRemoval, &op_removal::OpRemoval];

@@ -37,6 +37,24 @@ impl Candidate {
     pub fn numbers(&self) -> impl Iterator<Item = f32> + '_ {
         self.value.iter().map(|bits| f32::from_bits(*bits))
     }
+
+    /// The numbers that it bakes, when they are `count` finite ones.
+    ///
+    /// # Errors
+    /// When there are more or fewer, or one is infinite or not a number.
+    pub fn baked(&self, count: usize) -> Result<Vec<f32>, Declined> {
+        let numbers: Vec<f32> = self.numbers().collect();
+        if numbers.len() != count {
+            return Err(Declined(format!(
+                "it bakes {} numbers, but the value has {count}",
+                numbers.len()
+            )));
+        }
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(Declined("it bakes a number that is not finite".into()));
+        }
+        Ok(numbers)
+    }
 }
 
 impl fmt::Display for Candidate {
@@ -55,6 +73,21 @@ impl fmt::Display for Candidate {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Declined(pub String);
 
+impl fmt::Display for Declined {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// A change that a pass thought of, and why it is not offered, when it is not.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Considered {
+    /// The change. What it would bake is left out when it is declined.
+    pub candidate: Candidate,
+    /// Why it is not offered.
+    pub declined: Option<Declined>,
+}
+
 /// A pass: it lists candidates, and makes the change that one describes.
 ///
 /// The candidate law: `candidates` is deterministic; `applies` can be asked of any shader;
@@ -66,8 +99,16 @@ pub trait Pass: Sync {
     fn summary(&self) -> &'static str;
     /// What a candidate of this pass may change.
     fn class(&self, candidate: &Candidate) -> Class;
+    /// Every change that this pass thinks of, in a fixed order; those that it declines with the reason.
+    fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered>;
     /// Every change that this pass could make, in a fixed order.
-    fn candidates(&self, shader: &Shader, facts: &Facts) -> Vec<Candidate>;
+    fn candidates(&self, shader: &Shader, facts: &Facts) -> Vec<Candidate> {
+        let considered = self.consider(shader, facts).into_iter();
+        considered
+            .filter(|considered| considered.declined.is_none())
+            .map(|considered| considered.candidate)
+            .collect()
+    }
     /// Whether a candidate can be applied to a shader.
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined>;
     /// The shader with the change made.
@@ -95,17 +136,51 @@ impl Recipe {
     ///
     /// # Errors
     /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
-    pub fn replay(&self, base: &Shader) -> Result<Shader, ReplayError> {
+    pub fn replay(&self, base: &Shader) -> Result<Shader, Box<ReplayError>> {
         let mut shader = base.clone();
         for (step, candidate) in self.0.iter().enumerate() {
-            shader = apply(&shader, candidate).map_err(|declined| ReplayError {
-                step,
-                candidate: candidate.clone(),
-                declined,
+            shader = apply(&shader, candidate).map_err(|declined| {
+                Box::new(ReplayError {
+                    step,
+                    candidate: candidate.clone(),
+                    declined,
+                })
             })?;
         }
         Ok(shader)
     }
+}
+
+impl fmt::Display for ReplayError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            step,
+            candidate,
+            declined,
+        } = self;
+        write!(f, "step {}, {candidate}: {declined}", step + 1)
+    }
+}
+
+impl std::error::Error for ReplayError {}
+
+/// Every candidate of every pass, pass by pass.
+pub fn candidates(shader: &Shader, facts: &Facts) -> Vec<Candidate> {
+    PASSES
+        .iter()
+        .flat_map(|pass| pass.candidates(shader, facts))
+        .collect()
+}
+
+/// The pass of a command-line name.
+///
+/// # Errors
+/// When no pass has that name.
+pub fn pass(name: &str) -> Result<&'static dyn Pass, Declined> {
+    let mut passes = PASSES.iter().copied();
+    passes
+        .find(|pass| pass.name() == name)
+        .ok_or_else(|| Declined(format!("there is no pass `{name}`")))
 }
 
 /// Applies one candidate through the pass that it names.
@@ -113,10 +188,7 @@ impl Recipe {
 /// # Errors
 /// When no pass has that name, or the pass declines.
 pub fn apply(shader: &Shader, candidate: &Candidate) -> Result<Shader, Declined> {
-    let pass = PASSES
-        .iter()
-        .find(|pass| pass.name() == candidate.pass)
-        .ok_or_else(|| Declined(format!("there is no pass `{}`", candidate.pass)))?;
+    let pass = pass(&candidate.pass)?;
     pass.applies(shader, candidate)?;
     Ok(pass.apply(shader, candidate))
 }

@@ -3,6 +3,7 @@
 //! Normal form is made by [`crate::normalize`] and changed only by [`crate::edit`].
 //! The module holds the chosen entry points and no other function.
 
+use crate::flow::Findings;
 use crate::operands::User;
 use crate::places::Places;
 use naga::proc::{ResolveContext, TypeResolution};
@@ -114,6 +115,7 @@ pub struct Shader {
 struct Known {
     types: OnceLock<Vec<TypeResolution>>,
     places: OnceLock<Places>,
+    findings: OnceLock<Findings>,
 }
 
 impl Shader {
@@ -200,6 +202,12 @@ impl Shader {
         self.known[entry]
             .places
             .get_or_init(|| Places::of(&self.module.entry_points[entry].function))
+    }
+
+    /// What was found out about what flows where in a stage's entry point.
+    pub(crate) fn findings(&self, stage: Stage) -> &Findings {
+        let known = &self.known[self.entry(stage)];
+        known.findings.get_or_init(|| Findings::of(self, stage))
     }
 
     /// What reads a value of a stage's entry point: expressions in arena order, then statements.

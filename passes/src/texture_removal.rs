@@ -1,0 +1,325 @@
+//! texture-removal: a texture read becomes a constant.
+//!
+//! Precondition. The site is a read (`textureSample` and its kin, `textureLoad`) that returns f32 in
+//! the fragment stage, of a texture whose image is known, and nothing but the picture depends on it; or
+//! the site is the texture variable itself, and all its reads are such reads of one kind.
+//!
+//! Effect. The read's users use a constant that the candidate carries. `seen-mean`: the mean of what
+//! the read returned over the samples of the scene. `texture-mean`: the mean of the whole texture, at
+//! the MIP level that the distance leads to. `only-colour`: the same, of a texture that has one colour.
+//! At a texture's variable every read becomes the same constant, so that the texture is not needed any
+//! more, where each removal alone would still pay for the others; `seen-mean` is then the mean over all
+//! reads. The variable's own id is the site, such as `fs_main.albedo_texture`.
+//!
+//! Error. For `texture-mean`, the least-squares error of the constant at that MIP level is the standard
+//! deviation of the texels: [`deviation`] gives it. Its effect on the picture is measured. `only-colour`
+//! is lossless.
+//!
+//! Declines.
+//! - A texture that the facts do not know: it is dynamic, and may hold anything.
+//! - Integer textures: their numbers name things, and things have no mean.
+//! - `texture-mean` for a gather or a depth comparison, whose result is no mix of texels, and for an
+//!   array of textures.
+//! - A read that decides when a loop ends (unless a counter of integers ends it anyway), a built-in
+//!   output or what is written to memory.
+//! - A read that no sample saw, for `seen-mean`.
+//!
+//! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail",
+//! 2003, section 2.1.
+
+use crate::Facts;
+use crate::edit::{Edit, New};
+use crate::flow::{Flow, Value};
+use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
+use crate::shader::{Shader, Stage};
+use naga::{Expression, GlobalVariable, Handle};
+
+/// The stage whose reads are removed: textures that move vertices belong to the mesh.
+const STAGE: Stage = Stage::Fragment;
+
+/// The pass.
+pub struct TextureRemoval;
+
+/// What a read becomes: the only place where the words of this pass are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Choice {
+    SeenMean,
+    TextureMean,
+    OnlyColour,
+}
+
+impl Choice {
+    const ALL: [(Self, &'static str); 3] = [
+        (Self::SeenMean, "seen-mean"),
+        (Self::TextureMean, "texture-mean"),
+        (Self::OnlyColour, "only-colour"),
+    ];
+
+    fn parse(choice: &str) -> Result<Self, Declined> {
+        Self::ALL
+            .iter()
+            .find(|(_, word)| *word == choice)
+            .map(|(parsed, _)| *parsed)
+            .ok_or_else(|| Declined(format!("texture-removal has no choice `{choice}`")))
+    }
+
+    fn word(self) -> &'static str {
+        Self::ALL
+            .iter()
+            .find(|(choice, _)| *choice == self)
+            .map_or("", |(_, word)| word)
+    }
+}
+
+/// The least-squares error of a candidate that puts a texture's mean in its place: a standard deviation
+/// for each channel, in linear light, at the facts' MIP level. `None` for other candidates, and for a
+/// texture that the facts do not know.
+pub fn deviation(shader: &Shader, facts: &Facts, candidate: &Candidate) -> Option<[f32; 4]> {
+    if candidate.pass != TextureRemoval.name() {
+        return None;
+    }
+    match Choice::parse(&candidate.choice).ok()? {
+        Choice::SeenMean => None,
+        Choice::OnlyColour => Some([0.0; 4]),
+        Choice::TextureMean => {
+            let (stage, site) = shader.find(&candidate.site)?;
+            let flow = Flow::new(shader, stage)?;
+            let image = image(&flow, site).unwrap_or(site);
+            let name = shader.module().global_variables[flow.global(image)?]
+                .name
+                .as_ref()?;
+            facts.textures.get(name)?.deviation_at_level()
+        }
+    }
+}
+
+impl Pass for TextureRemoval {
+    fn name(&self) -> &'static str {
+        "texture-removal"
+    }
+
+    fn summary(&self) -> &'static str {
+        "a texture read becomes a constant"
+    }
+
+    fn class(&self, candidate: &Candidate) -> Class {
+        match Choice::parse(&candidate.choice) {
+            Ok(Choice::OnlyColour) => Class::Lossless,
+            _ => Class::Lossy,
+        }
+    }
+
+    fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered> {
+        let Some(flow) = Flow::new(shader, STAGE) else {
+            return Vec::new();
+        };
+        let survey = Survey {
+            shader,
+            flow: &flow,
+            facts,
+        };
+        let mut found = Vec::new();
+        for (site, _) in flow.function.expressions.iter() {
+            if let Some(image) = image(&flow, site) {
+                survey.list(site, flow.global(image), &[site], &mut found);
+            }
+        }
+        for (site, expression) in flow.function.expressions.iter() {
+            if let Expression::GlobalVariable(texture) = *expression {
+                let reads = reads(&flow, texture);
+                if reads.len() > 1 {
+                    survey.list(site, Some(texture), &reads, &mut found);
+                }
+            }
+        }
+        found
+    }
+
+    fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
+        plan(shader, candidate).map(drop)
+    }
+
+    fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader {
+        match plan(shader, candidate) {
+            Ok((reads, numbers)) => {
+                let mut edit = Edit::new(shader, STAGE);
+                for read in reads {
+                    edit.replace(read, New::Numbers(numbers.clone()));
+                }
+                edit.finish()
+            }
+            Err(declined) => panic!("{candidate} was applied, but {declined}"),
+        }
+    }
+}
+
+/// The reads that a candidate removes, and the constant that they become.
+fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Vec<Value>, Vec<f32>), Declined> {
+    let choice = Choice::parse(&candidate.choice)?;
+    let (stage, site) = shader
+        .find(&candidate.site)
+        .ok_or_else(|| Declined(format!("there is no value `{}`", candidate.site.path())))?;
+    let flow = (stage == STAGE)
+        .then(|| Flow::new(shader, stage))
+        .flatten()
+        .ok_or_else(|| Declined("only reads of the fragment stage are removed".into()))?;
+    let reads = match flow.function.expressions[site] {
+        Expression::GlobalVariable(texture) => reads(&flow, texture),
+        _ if image(&flow, site).is_some() => vec![site],
+        _ => {
+            return Err(Declined(
+                "it is neither a texture read nor a texture".into(),
+            ));
+        }
+    };
+    let count = removable(&flow, &reads, choice)?;
+    Ok((reads, candidate.baked(count)?))
+}
+
+/// The texture that a value is read from, when it is a texture read.
+fn image(flow: &Flow, value: Value) -> Option<Value> {
+    match flow.function.expressions[value] {
+        Expression::ImageSample { image, .. } | Expression::ImageLoad { image, .. } => Some(image),
+        _ => None,
+    }
+}
+
+/// The reads of a texture, in arena order.
+fn reads(flow: &Flow, texture: Handle<GlobalVariable>) -> Vec<Value> {
+    let values = flow.function.expressions.iter().map(|(value, _)| value);
+    values
+        .filter(|value| image(flow, *value).is_some_and(|i| flow.global(i) == Some(texture)))
+        .collect()
+}
+
+/// What a read returns a mix of.
+#[derive(PartialEq)]
+enum Kind {
+    Texels,
+    Gathered(naga::SwizzleComponent),
+    Compared,
+}
+
+fn kind(flow: &Flow, read: Value) -> Kind {
+    match flow.function.expressions[read] {
+        Expression::ImageSample {
+            gather: Some(component),
+            ..
+        } => Kind::Gathered(component),
+        Expression::ImageSample {
+            depth_ref: Some(_), ..
+        } => Kind::Compared,
+        _ => Kind::Texels,
+    }
+}
+
+/// How many numbers all reads return, when all can become one constant.
+fn removable(flow: &Flow, reads: &[Value], choice: Choice) -> Result<usize, Declined> {
+    let (Some(first), true) = (
+        reads.first(),
+        reads.iter().all(|read| flow.floats(*read).is_some()),
+    ) else {
+        return Err(Declined(if reads.is_empty() {
+            "nothing reads it".into()
+        } else {
+            "it does not hold floats, so it has no mean".into()
+        }));
+    };
+    let first_kind = kind(flow, *first);
+    for read in reads {
+        if let Some(why) = flow.decides(*read) {
+            return Err(Declined(why.to_string()));
+        }
+        if flow.floats(*read) != flow.floats(*first) || kind(flow, *read) != first_kind {
+            return Err(Declined("it is read in different ways".into()));
+        }
+        let whole = matches!(
+            image(flow, *read).map(|image| &flow.function.expressions[image]),
+            Some(Expression::GlobalVariable(_))
+        );
+        if choice != Choice::SeenMean && !whole {
+            return Err(Declined("it is one of an array of textures".into()));
+        }
+    }
+    if choice != Choice::SeenMean && first_kind != Kind::Texels {
+        return Err(Declined("it returns no mix of texels".into()));
+    }
+    Ok(flow.floats(*first).unwrap_or(1))
+}
+
+/// One listing of the candidates.
+struct Survey<'a> {
+    shader: &'a Shader,
+    flow: &'a Flow<'a>,
+    facts: &'a Facts,
+}
+
+impl Survey<'_> {
+    fn list(
+        &self,
+        site: Value,
+        texture: Option<Handle<GlobalVariable>>,
+        reads: &[Value],
+        found: &mut Vec<Considered>,
+    ) {
+        let name = texture.and_then(|t| self.shader.module().global_variables[t].name.as_deref());
+        let known = name.and_then(|name| self.facts.textures.get(name));
+        let of_texture = if known.is_some_and(|texture| texture.is_flat()) {
+            Choice::OnlyColour
+        } else {
+            Choice::TextureMean
+        };
+        for choice in [Choice::SeenMean, of_texture] {
+            let verdict = removable(self.flow, reads, choice).and_then(|count| {
+                let known = known.ok_or_else(|| {
+                    Declined("its texture has no image, so it may hold anything".into())
+                })?;
+                match choice {
+                    Choice::SeenMean => self.seen_mean(reads, count),
+                    _ => known.mean_at_level().map(|mean| mean[..count].to_vec()),
+                }
+            });
+            let (value, declined) = match verdict {
+                Ok(mean) => (mean.iter().map(|number| number.to_bits()).collect(), None),
+                Err(declined) => (Vec::new(), Some(declined)),
+            };
+            let candidate = Candidate {
+                pass: TextureRemoval.name().into(),
+                site: self.shader.id(STAGE, site).clone(),
+                choice: choice.word().into(),
+                value,
+            };
+            found.push(Considered {
+                candidate,
+                declined,
+            });
+        }
+    }
+
+    /// The mean of what reads returned, each weighted by how often it was seen.
+    fn seen_mean(&self, reads: &[Value], count: usize) -> Result<Vec<f32>, Declined> {
+        let mut sum = vec![0.0f64; count];
+        let mut samples = 0u64;
+        let mut unseen = None;
+        for read in reads {
+            let id = self.shader.id(STAGE, *read);
+            match self.facts.mean(id, count) {
+                Ok(mean) => {
+                    let weight = self.facts.values[id].count;
+                    samples += weight;
+                    for (sum, mean) in sum.iter_mut().zip(mean) {
+                        *sum += f64::from(*mean) * weight as f64;
+                    }
+                }
+                Err(declined) => unseen = Some(declined),
+            }
+        }
+        match unseen {
+            Some(declined) if samples == 0 => Err(declined),
+            _ => Ok(sum
+                .iter()
+                .map(|sum| (sum / samples as f64) as f32)
+                .collect()),
+        }
+    }
+}
