@@ -1,1 +1,277 @@
 //! Draws a frame: rasterises once, shades as often as there are variants.
+
+use super::image::Picture;
+use super::lane::{LANES, Mask, Words};
+use super::machine::{Bindings, Machine, Profile};
+use super::program::{Program, Slot};
+use super::raster::{Block, Coverage, Frame, rasterize};
+use naga::{Binding, BuiltIn, ScalarKind};
+use rayon::prelude::*;
+
+/// Blocks that one machine runs. Profiles are summed machine by machine, so this is part of the result's
+/// bits; the number of threads is not.
+const BLOCKS_PER_MACHINE: usize = 8;
+
+/// What a fragment program made of a coverage.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shading {
+    /// For each covered fragment of the coverage, in its order, the colour at location 0. Components
+    /// that the program does not return are 0, alpha 1; integers are converted.
+    pub colours: Vec<[f32; 4]>,
+    /// For each covered fragment, whether it was kept (not discarded, and its sample mask not 0).
+    pub alive: Vec<bool>,
+    /// For each covered fragment its depth, when the program returns one; empty otherwise.
+    pub depths: Vec<f32>,
+    /// What was executed.
+    pub profile: Profile,
+}
+
+/// Shades every fragment, in parallel; the result does not depend on the number of threads.
+///
+/// Inputs are matched by location or built-in and component, so a program may read less than the one that
+/// the coverage was made for; what the coverage does not have is 0.
+///
+/// # Panics
+/// When a resource of the program is not bound.
+pub fn shade(fragment: &Program, coverage: &Coverage, bindings: &Bindings) -> Shading {
+    let mut shading = Shading::default();
+    shade_into(fragment, coverage, bindings, &mut shading);
+    shading
+}
+
+/// The same into a shading that is used again, so that nothing is allocated for its fragments.
+///
+/// # Panics
+/// When a resource of the program is not bound.
+pub fn shade_into(
+    fragment: &Program,
+    coverage: &Coverage,
+    bindings: &Bindings,
+    shading: &mut Shading,
+) {
+    let interface = Interface::new(fragment, coverage);
+    let depths = if interface.depth.is_some() {
+        coverage.fragments
+    } else {
+        0
+    };
+    shading.colours.resize(coverage.fragments, [0.0; 4]);
+    shading.alive.resize(coverage.fragments, false);
+    shading.depths.resize(depths, 0.0);
+
+    let mut jobs = Vec::new();
+    let (mut colours, mut alive, mut depths) = (
+        &mut shading.colours[..],
+        &mut shading.alive[..],
+        &mut shading.depths[..],
+    );
+    for blocks in coverage.blocks.chunks(BLOCKS_PER_MACHINE) {
+        let count = blocks.iter().map(Block::covered_count).sum();
+        jobs.push(Job {
+            blocks,
+            colours: colours.split_off_mut(..count).unwrap_or_default(),
+            alive: alive.split_off_mut(..count).unwrap_or_default(),
+            depths: depths.split_off_mut(..count).unwrap_or_default(),
+        });
+    }
+    let profiles: Vec<Profile> = jobs
+        .into_par_iter()
+        .map(|job| job.run(fragment, bindings, &interface))
+        .collect();
+    shading.profile = profiles
+        .into_iter()
+        .reduce(merge)
+        .unwrap_or_else(|| Machine::new(fragment, bindings).profile());
+}
+
+/// The picture in fine pixels, fragments that hide each other resolved. Background pixels are 0.
+pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
+    let mut picture = Picture::empty(coverage.width, coverage.height);
+    let mut nearest = if coverage.late {
+        vec![1.0_f32; picture.pixels.len()]
+    } else {
+        Vec::new()
+    };
+    for block in &coverage.blocks {
+        for (i, lane) in lanes(block.covered).enumerate() {
+            let fragment = block.first + i;
+            if !shading.alive[fragment] {
+                continue;
+            }
+            let pixel = block.pixels[lane] as usize;
+            if coverage.late {
+                let depth = shading.depths.get(fragment);
+                let depth = depth.copied().unwrap_or(block.depths[lane]);
+                // Clamped to the viewport's range; NaN is 0.
+                let depth = depth.max(0.0);
+                if depth >= nearest[pixel] {
+                    continue;
+                }
+                nearest[pixel] = depth;
+            }
+            picture.pixels[pixel] = shading.colours[fragment];
+            picture.covered[pixel] = 1.0;
+        }
+    }
+    picture
+}
+
+/// Draws a frame whole: rasterises, shades, resolves, and filters the grid's fine pixels into pixels.
+/// The profile is the fragment program's.
+///
+/// # Panics
+/// When a resource of a program is not bound, or the frame is larger than [`super::raster::MAX_EDGE`].
+pub fn draw(vertex: &Program, fragment: &Program, frame: &Frame) -> (Picture, Profile) {
+    let coverage = rasterize(vertex, fragment, frame);
+    let shading = shade(fragment, &coverage, &frame.bindings);
+    let picture = resolve(&coverage, &shading);
+    (picture.box_filtered(frame.grid), shading.profile)
+}
+
+/// How a program's inputs and outputs lie in a coverage and a shading.
+struct Interface {
+    /// For each input the coverage's, when they are not the same list.
+    inputs: Option<Vec<Option<usize>>>,
+    /// How many outputs there are.
+    outputs: usize,
+    /// The outputs that are the colour, with their component and kind.
+    colour: Vec<(usize, usize, ScalarKind)>,
+    /// The output that is the depth.
+    depth: Option<usize>,
+    /// The output that is the sample mask.
+    sample_mask: Option<usize>,
+}
+
+impl Interface {
+    fn new(program: &Program, coverage: &Coverage) -> Self {
+        let same = |a: &Slot, b: &Slot| {
+            a.component == b.component
+                && match (&a.binding, &b.binding) {
+                    (
+                        Binding::Location { location: a, .. },
+                        Binding::Location { location: b, .. },
+                    ) => a == b,
+                    (Binding::BuiltIn(a), Binding::BuiltIn(b)) => a == b,
+                    _ => false,
+                }
+        };
+        let found: Vec<Option<usize>> = program
+            .inputs()
+            .iter()
+            .map(|slot| coverage.slots.iter().position(|have| same(have, slot)))
+            .collect();
+        let identical = found.len() == coverage.slots.len()
+            && found.iter().enumerate().all(|(i, &at)| at == Some(i));
+        let outputs = program.outputs();
+        let built_in = |wanted: BuiltIn| {
+            outputs
+                .iter()
+                .position(|slot| slot.binding == Binding::BuiltIn(wanted))
+        };
+        Self {
+            inputs: (!identical).then_some(found),
+            outputs: outputs.len(),
+            colour: outputs
+                .iter()
+                .enumerate()
+                .filter(|(_, slot)| {
+                    matches!(
+                        slot.binding,
+                        Binding::Location {
+                            location: 0,
+                            blend_src: None | Some(0),
+                            ..
+                        }
+                    )
+                })
+                .map(|(i, slot)| (i, slot.component, slot.kind))
+                .collect(),
+            depth: built_in(BuiltIn::FragDepth),
+            sample_mask: built_in(BuiltIn::SampleMask),
+        }
+    }
+}
+
+/// The blocks of one machine, and where their results go.
+struct Job<'a> {
+    blocks: &'a [Block],
+    colours: &'a mut [[f32; 4]],
+    alive: &'a mut [bool],
+    depths: &'a mut [f32],
+}
+
+impl Job<'_> {
+    fn run(self, program: &Program, bindings: &Bindings, interface: &Interface) -> Profile {
+        let mut machine = Machine::new(program, bindings);
+        let mut outputs = vec![[0; LANES]; interface.outputs];
+        let mut chosen: Vec<Words> = match &interface.inputs {
+            Some(inputs) => vec![[0; LANES]; inputs.len()],
+            None => Vec::new(),
+        };
+        let mut fragment = 0;
+        for block in self.blocks {
+            let inputs = match &interface.inputs {
+                None => &block.inputs,
+                Some(places) => {
+                    for (words, place) in chosen.iter_mut().zip(places) {
+                        if let Some(place) = *place {
+                            *words = block.inputs[place];
+                        }
+                    }
+                    &chosen
+                }
+            };
+            let kept = machine.run(inputs, block.active, block.covered, &mut outputs);
+            for lane in lanes(block.covered) {
+                let mut colour = [0.0, 0.0, 0.0, 1.0];
+                for &(output, component, kind) in &interface.colour {
+                    let word = outputs[output][lane];
+                    colour[component & 3] = match kind {
+                        ScalarKind::Uint | ScalarKind::Bool => word as f32,
+                        ScalarKind::Sint => word.cast_signed() as f32,
+                        _ => f32::from_bits(word),
+                    };
+                }
+                self.colours[fragment] = colour;
+                self.alive[fragment] = kept.0[lane / 64] >> (lane % 64) & 1 == 1
+                    && interface
+                        .sample_mask
+                        .is_none_or(|o| outputs[o][lane] & 1 == 1);
+                if let Some(depth) = interface.depth {
+                    self.depths[fragment] = f32::from_bits(outputs[depth][lane]);
+                }
+                fragment += 1;
+            }
+        }
+        machine.profile()
+    }
+}
+
+/// The profile of two runs of one program, the first one first.
+fn merge(mut first: Profile, second: Profile) -> Profile {
+    first.lanes += second.lanes;
+    first.work += second.work;
+    for (ours, theirs) in first.probes.iter_mut().zip(&second.probes) {
+        for (ours, theirs) in ours.iter_mut().zip(theirs) {
+            ours.count += theirs.count;
+            ours.sum += theirs.sum;
+            // NaN wins, unlike in `f32::min`.
+            if theirs.min < ours.min || theirs.min.is_nan() {
+                ours.min = theirs.min;
+            }
+            if theirs.max > ours.max || theirs.max.is_nan() {
+                ours.max = theirs.max;
+            }
+        }
+    }
+    first
+}
+
+/// The lanes of a mask, in order.
+fn lanes(mask: Mask) -> impl Iterator<Item = usize> {
+    mask.0.into_iter().enumerate().flat_map(|(i, word)| {
+        let some = |word: u64| (word != 0).then_some(word);
+        std::iter::successors(some(word), move |word| some(word & (word - 1)))
+            .map(move |word| i * 64 + word.trailing_zeros() as usize)
+    })
+}

@@ -1,1 +1,0 @@
-//! The rasteriser: triangles to quads of fragments, with depth, near clipping and perspective-correct inputs.

@@ -1,0 +1,203 @@
+//! The rasteriser: triangles to quads of fragments, with depth, near clipping and perspective-correct inputs.
+//!
+//! ```text
+//! Frame x vertex Program --vertices--> clip positions and varyings
+//!   --triangle--> which pixels each triangle covers
+//!   --quads--> Coverage: blocks of 64 quads, the fragment program's inputs ready in them
+//! ```
+//!
+//! WebGPU's rules: clip space has y up and z in 0..1, the framebuffer has y down; depth is tested with
+//! `less` against a buffer of f32 cleared to 1; nothing is culled; front faces are counter-clockwise on screen.
+//! Positions are snapped to 1/256 pixel for coverage (top-left rule) and exact for interpolation.
+
+mod quads;
+mod triangle;
+mod vertices;
+
+use super::lane::{LANES, Mask, Words};
+use super::machine::{Bindings, Profile};
+use super::program::{Program, Slot};
+use crate::scene::mesh::Mesh;
+use naga::{Binding, BuiltIn};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The longest edge of a frame in fine pixels (`width * grid`).
+pub const MAX_EDGE: u32 = 16_384;
+
+/// What feeds a vertex input. Components that the mesh does not have, and attributes that
+/// it has none of, read as (0, 0, 0, 1). Integer inputs get the value converted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Attribute {
+    /// Object-space position.
+    Position,
+    /// Normal.
+    Normal,
+    /// Texture coordinates.
+    Uv,
+    /// Tangent, with the sign of the bitangent in w.
+    Tangent,
+    /// The sign of the bitangent alone.
+    BitangentSign,
+    /// Colour.
+    Colour,
+}
+
+/// One picture to draw.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The triangles.
+    pub mesh: Arc<Mesh>,
+    /// Which attribute feeds each vertex-input location; other locations read (0, 0, 0, 1).
+    pub attributes: BTreeMap<u32, Attribute>,
+    /// The resources of both stages.
+    pub bindings: Bindings,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Where in a pixel it is sampled, from the centre, in pixels, -0.5..0.5.
+    pub offset: [f32; 2],
+    /// How many fine pixels a pixel has along each axis: 1 to draw, 4 for the reference.
+    /// Derivatives are those between fine pixels.
+    pub grid: u32,
+}
+
+/// What a frame shows before it is shaded: fragments in a fixed order, with the inputs of the fragment program.
+#[derive(Clone, Debug)]
+pub struct Coverage {
+    /// Width in fine pixels.
+    pub width: u32,
+    /// Height in fine pixels.
+    pub height: u32,
+    /// Fine pixels to a pixel, along each axis.
+    pub grid: u32,
+    /// The fragments, 64 quads a block; they all are full but the last.
+    pub blocks: Vec<Block>,
+    /// How many fragments are covered, in all blocks.
+    pub fragments: usize,
+    /// What each word of [`Block::inputs`] is: the fragment program's inputs.
+    pub slots: Vec<Slot>,
+    /// Whether fragments hide each other only after shading, since the shader may discard them or move their
+    /// depth. If not, each pixel has one covered fragment at most, in tiles of 16 x 16 pixels.
+    /// If so, all of a pixel's fragments are here, in the order of the triangles.
+    pub late: bool,
+    /// What the vertex program executed.
+    pub vertex_profile: Profile,
+}
+
+/// 64 quads of fragments.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// One entry per slot of [`Coverage::slots`].
+    pub inputs: Vec<Words>,
+    /// The lanes that run: all four of every quad.
+    pub active: Mask,
+    /// The fragments that count; the other active lanes are helpers, their inputs extrapolated.
+    pub covered: Mask,
+    /// The pixel of each covered lane, `y * width + x` in fine pixels; `u32::MAX` for the others.
+    pub pixels: Words,
+    /// The depth of each active lane, 0..1 where covered.
+    pub depths: [f32; LANES],
+    /// The place of the first covered fragment among all of [`Coverage::fragments`].
+    pub first: usize,
+}
+
+/// Runs the vertex program over the mesh and finds the fragments of the frame.
+///
+/// # Panics
+/// When a resource of the vertex program is not bound, `grid` is 0, or the frame is larger than [`MAX_EDGE`].
+pub fn rasterize(vertex: &Program, fragment: &Program, frame: &Frame) -> Coverage {
+    let vertices = vertices::run(vertex, frame);
+    let late = fragment.discards()
+        || fragment.outputs().iter().any(|slot| {
+            matches!(
+                slot.binding,
+                Binding::BuiltIn(BuiltIn::FragDepth | BuiltIn::SampleMask)
+            )
+        });
+    cover(
+        vertices,
+        vertex.outputs(),
+        fragment.inputs(),
+        &frame.mesh.indices,
+        &Target::of(frame),
+        late,
+    )
+}
+
+/// The fragments of triangles whose vertices have been shaded.
+fn cover(
+    vertices: vertices::Vertices,
+    outputs: &[Slot],
+    inputs: &[Slot],
+    indices: &[u32],
+    target: &Target,
+    late: bool,
+) -> Coverage {
+    let triangles: Vec<_> = indices
+        .chunks_exact(3)
+        .enumerate()
+        .filter_map(|(i, corners)| {
+            let corners = [corners[0], corners[1], corners[2]];
+            triangle::Triangle::new(i as u32, corners, &vertices.positions, target)
+        })
+        .collect();
+    let quads = if late {
+        quads::in_order(&triangles)
+    } else {
+        quads::visible(&triangles, target)
+    };
+    let blocks = quads::blocks(&quads, &triangles, &vertices, outputs, inputs, target);
+    let fragments = blocks.last().map_or(0, |b| b.first + b.covered_count());
+    Coverage {
+        width: target.width,
+        height: target.height,
+        grid: target.grid,
+        blocks,
+        fragments,
+        slots: inputs.to_vec(),
+        late,
+        vertex_profile: vertices.profile,
+    }
+}
+
+impl Block {
+    /// How many of its lanes are covered.
+    pub fn covered_count(&self) -> usize {
+        self.covered
+            .0
+            .iter()
+            .map(|word| word.count_ones() as usize)
+            .sum()
+    }
+}
+
+/// The grid of fine pixels that triangles are drawn to.
+struct Target {
+    /// In fine pixels.
+    width: u32,
+    /// In fine pixels.
+    height: u32,
+    /// Fine pixels to a pixel.
+    grid: u32,
+    /// Where a fine pixel is sampled, from its centre, in pixels.
+    offset: [f32; 2],
+}
+
+impl Target {
+    fn of(frame: &Frame) -> Self {
+        assert!(frame.grid > 0, "a grid has at least one cell");
+        let [width, height] = [frame.width, frame.height].map(|n| {
+            n.checked_mul(frame.grid)
+                .filter(|&n| n <= MAX_EDGE)
+                .expect("a frame is no larger than MAX_EDGE")
+        });
+        Self {
+            width,
+            height,
+            grid: frame.grid,
+            offset: frame.offset,
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Runs the vertex program over a mesh.
+
+use super::{Attribute, Frame};
+use crate::eval::lane::{LANES, Mask, Words};
+use crate::eval::machine::{Machine, Profile};
+use crate::eval::program::{Program, Slot};
+use crate::scene::mesh::Mesh;
+use naga::{Binding, BuiltIn, ScalarKind};
+
+/// What the vertex program made of every vertex.
+pub(super) struct Vertices {
+    /// Clip positions.
+    pub(super) positions: Vec<[f32; 4]>,
+    /// For each slot of the program's outputs, a word for every vertex.
+    pub(super) outputs: Vec<Vec<u32>>,
+    /// What was executed.
+    pub(super) profile: Profile,
+}
+
+/// Runs the program over all vertices of the frame's mesh, in order.
+pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
+    let mesh = &*frame.mesh;
+    let count = mesh.positions.len();
+    let mut outputs = vec![Vec::with_capacity(count); program.outputs().len()];
+    let mut machine = Machine::new(program, &frame.bindings);
+    let mut inputs = vec![[0; LANES]; program.inputs().len()];
+    let mut block = vec![[0; LANES]; program.outputs().len()];
+    for first in (0..count).step_by(LANES) {
+        let lanes = (count - first).min(LANES);
+        for (words, slot) in inputs.iter_mut().zip(program.inputs()) {
+            feed(words, slot, first, lanes, mesh, frame);
+        }
+        let active = first_lanes(lanes);
+        machine.run(&inputs, active, active, &mut block);
+        for (all, words) in outputs.iter_mut().zip(&block) {
+            all.extend_from_slice(&words[..lanes]);
+        }
+    }
+    let mut positions = vec![[f32::NAN; 4]; count];
+    for (slot, words) in program.outputs().iter().zip(&outputs) {
+        if matches!(slot.binding, Binding::BuiltIn(BuiltIn::Position { .. })) {
+            for (position, &word) in positions.iter_mut().zip(words) {
+                position[slot.component] = f32::from_bits(word);
+            }
+        }
+    }
+    Vertices {
+        positions,
+        outputs,
+        profile: machine.profile(),
+    }
+}
+
+/// Fills one input for the vertices from `first`.
+fn feed(words: &mut Words, slot: &Slot, first: usize, lanes: usize, mesh: &Mesh, frame: &Frame) {
+    let attribute = match slot.binding {
+        Binding::BuiltIn(BuiltIn::VertexIndex) => {
+            for (lane, word) in words[..lanes].iter_mut().enumerate() {
+                *word = (first + lane) as u32;
+            }
+            return;
+        }
+        // One instance, and every base is 0.
+        Binding::BuiltIn(_) => return words[..lanes].fill(0),
+        Binding::Location { location, .. } => frame.attributes.get(&location),
+    };
+    for (lane, word) in words[..lanes].iter_mut().enumerate() {
+        let value = attribute
+            .and_then(|&attribute| component(mesh, attribute, first + lane, slot.component))
+            .unwrap_or(if slot.component == 3 { 1.0 } else { 0.0 });
+        *word = match slot.kind {
+            ScalarKind::Uint => value as u32,
+            ScalarKind::Sint => (value as i32).cast_unsigned(),
+            ScalarKind::Bool => u32::from(value != 0.0),
+            ScalarKind::Float | ScalarKind::AbstractInt | ScalarKind::AbstractFloat => {
+                value.to_bits()
+            }
+        };
+    }
+}
+
+/// A component of a vertex's attribute, if the mesh has it.
+fn component(mesh: &Mesh, attribute: Attribute, vertex: usize, component: usize) -> Option<f32> {
+    let three = |all: &[[f32; 3]]| all.get(vertex)?.get(component).copied();
+    match attribute {
+        Attribute::Position => three(&mesh.positions),
+        Attribute::Normal => three(&mesh.normals),
+        Attribute::Uv => mesh.uvs.get(vertex)?.get(component).copied(),
+        Attribute::Tangent => mesh.tangents.get(vertex)?.get(component).copied(),
+        Attribute::BitangentSign if component == 0 => mesh.tangents.get(vertex).map(|t| t[3]),
+        Attribute::BitangentSign => None,
+        Attribute::Colour => mesh.colours.get(vertex)?.get(component).copied(),
+    }
+}
+
+/// The mask of the first `count` lanes.
+fn first_lanes(count: usize) -> Mask {
+    let mut mask = Mask::default();
+    for (i, word) in mask.0.iter_mut().enumerate() {
+        *word = match count.saturating_sub(i * 64) {
+            0 => 0,
+            n if n < 64 => (1 << n) - 1,
+            _ => u64::MAX,
+        };
+    }
+    mask
+}
