@@ -14,6 +14,7 @@ pub mod op_removal;
 pub mod operands;
 mod places;
 pub mod recipe;
+pub mod semantics;
 pub mod shader;
 pub mod texture_removal;
 
