@@ -26,9 +26,12 @@ pub struct Diagnostic {
     pub source: Option<(String, String)>,
     /// Places in that file, as byte ranges, each with a remark; the first is the main one.
     pub labels: Vec<(Range<usize>, String)>,
-    /// Ways out, or more of the reason.
+    /// Ways out, printed after `help:`, and more of the reason, which begin with `note: `.
     pub notes: Vec<String>,
 }
+
+/// What a note that is more of the reason begins with.
+const REASON: &str = "note: ";
 
 /// The result of everything in lodc that can fail because of its input.
 pub type Result<T> = std::result::Result<T, Box<Diagnostic>>;
@@ -79,6 +82,12 @@ impl Diagnostic {
         self
     }
 
+    /// Adds more of the reason.
+    pub fn with_reason(mut self: Box<Self>, reason: impl fmt::Display) -> Box<Self> {
+        self.notes.push(format!("{REASON}{reason}"));
+        self
+    }
+
     /// The whole message as text, with colour codes for a terminal or without.
     pub fn render(&self, colour: bool) -> String {
         let report = match self.severity {
@@ -86,15 +95,21 @@ impl Diagnostic {
             Severity::Warning => Report::warning(),
         }
         .with_message(&self.message)
-        .with_notes(self.notes.iter().map(|n| format!("help: {n}")).collect());
+        .with_notes(self.notes.iter().map(|n| note(n)).collect());
         let (name, text) = self.source.clone().unwrap_or_default();
-        let limit = text.len();
+        let report = match self.labels.is_empty() && !name.is_empty() {
+            // Without a place the file would not be named at all.
+            true => report.with_note(format!("{REASON}in {name}")),
+            false => report,
+        };
+        let text = printable(&text);
         let labels = self
             .labels
             .iter()
             .enumerate()
             .map(|(i, (range, remark))| {
-                let range = range.start.min(limit)..range.end.min(limit);
+                let start = boundary(&text, range.start);
+                let range = start..boundary(&text, range.end).max(start);
                 let label = if i == 0 {
                     Label::primary((), range)
                 } else {
@@ -117,6 +132,36 @@ impl Diagnostic {
     }
 }
 
+/// A note as it is printed.
+fn note(text: &str) -> String {
+    match text.starts_with(REASON) {
+        true => text.to_owned(),
+        false => format!("help: {text}"),
+    }
+}
+
+/// The text with control characters replaced by as many bytes, so that a file cannot steer the terminal
+/// and offsets stay right.
+fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c.is_control() && !matches!(c, '\n' | '\r' | '\t') {
+            true => out.extend(std::iter::repeat_n('?', c.len_utf8())),
+            false => out.push(c),
+        }
+    }
+    out
+}
+
+/// The nearest offset at or before `at` that does not split a character.
+fn boundary(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}
+
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.render(false))
@@ -124,3 +169,44 @@ impl fmt::Display for Diagnostic {
 }
 
 impl std::error::Error for Diagnostic {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_notes_and_reasons_are_shown() {
+        let text = Diagnostic::error("no such thing")
+            .with_source("a.wgsl", "let x = y;\n")
+            .with_label(8..9, "here")
+            .with_reason("there is none")
+            .with_note("declare it")
+            .to_string();
+        assert!(text.starts_with("error: no such thing\n"), "{text}");
+        assert!(text.contains("a.wgsl:1:9"), "{text}");
+        assert!(text.contains("= note: there is none"), "{text}");
+        assert!(text.contains("= help: declare it"), "{text}");
+    }
+
+    #[test]
+    fn a_file_is_named_without_a_place_too() {
+        let text = Diagnostic::error("bad")
+            .with_source("a.wgsl", "")
+            .to_string();
+        assert!(text.contains("= note: in a.wgsl"), "{text}");
+    }
+
+    #[test]
+    fn odd_places_and_bytes_do_no_harm() {
+        let render = |range| {
+            Diagnostic::warning("w")
+                .with_source("a", "ü\u{1b}[2J\u{85}ü")
+                .with_label(range, "")
+                .render(true)
+        };
+        for range in [0..1, 1..2, 0..99, 50..60, 3..1, 0..0] {
+            assert!(!render(range).contains("\u{1b}[2J"));
+        }
+        assert_eq!(printable("ü\u{85}\n").len(), "ü\u{85}\n".len());
+    }
+}

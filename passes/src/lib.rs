@@ -5,6 +5,7 @@
 //! replays to the same module always. Every pass moves a value to a cheaper rate, or removes it.
 //! This crate reads no files, starts no threads and knows no GPU.
 
+pub mod autolod;
 pub mod cost;
 pub mod edit;
 pub mod facts;

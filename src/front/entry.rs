@@ -1,0 +1,345 @@
+//! Entry points: which two lodc works on, and what they are fed.
+
+use super::names::{listed, nearest, whole_word};
+use crate::{Diagnostic, Result};
+use naga::{Binding, Handle, Module, ShaderStage, Span, Type, TypeInner};
+
+/// The entry points that the user asked for, by name; what is `None` must be unambiguous.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Stages {
+    /// The vertex entry point (`--vertex`).
+    pub vertex: Option<String>,
+    /// The fragment entry point (`--fragment`).
+    pub fragment: Option<String>,
+}
+
+/// One input of an entry point: an argument, or a member of an argument that is a struct.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// The argument's or member's name; empty when it has none.
+    pub name: String,
+    /// Its location or built-in.
+    pub binding: Binding,
+    /// Its type, in the module's arena.
+    pub ty: Handle<Type>,
+    /// Where it is declared; undefined when that is not known.
+    pub span: Span,
+}
+
+/// The inputs of the entry point at `entry`, flattened, in order. `text` is what the module was parsed from.
+pub fn inputs(module: &Module, entry: usize, text: &str) -> Vec<Input> {
+    let mut inputs = Vec::new();
+    let Some(entry) = module.entry_points.get(entry) else {
+        return inputs;
+    };
+    for argument in &entry.function.arguments {
+        match (&argument.binding, &module.types[argument.ty].inner) {
+            (Some(binding), _) => {
+                let name = argument.name.clone().unwrap_or_default();
+                // naga keeps no span of an argument: it is the first such word after the function's name.
+                let span = whole_word(text, 0..text.len(), &entry.name)
+                    .and_then(|at| whole_word(text, at.end..text.len(), &name));
+                inputs.push(Input {
+                    name,
+                    binding: binding.clone(),
+                    ty: argument.ty,
+                    span: span.map(Span::from).unwrap_or_default(),
+                });
+            }
+            (None, TypeInner::Struct { members, .. }) => {
+                let declared = module.types.get_span(argument.ty).to_range();
+                for member in members {
+                    let Some(binding) = &member.binding else {
+                        continue;
+                    };
+                    let name = member.name.clone().unwrap_or_default();
+                    let span = declared
+                        .clone()
+                        .and_then(|all| whole_word(text, all, &name));
+                    inputs.push(Input {
+                        name,
+                        binding: binding.clone(),
+                        ty: member.ty,
+                        span: span.map(Span::from).unwrap_or_default(),
+                    });
+                }
+            }
+            (None, _) => {}
+        }
+    }
+    inputs
+}
+
+/// Chooses the vertex (or none) and the fragment entry point, and checks that they fit together.
+pub(super) fn choose(
+    name: &str,
+    text: &str,
+    module: &Module,
+    stages: &Stages,
+) -> Result<(Option<String>, String)> {
+    let of = |stage: ShaderStage| -> Vec<&str> {
+        let entries = module.entry_points.iter().filter(|e| e.stage == stage);
+        entries.map(|e| e.name.as_str()).collect()
+    };
+    let (vertices, fragments) = (of(ShaderStage::Vertex), of(ShaderStage::Fragment));
+    let located = |message: String, names: &[&str]| {
+        let found = Diagnostic::error(message).with_source(name, text);
+        names
+            .iter()
+            .filter_map(|n| whole_word(text, 0..text.len(), n))
+            .fold(found, |d, place| d.with_label(place, ""))
+    };
+    let pick = |what: &str, have: &[&str], wanted: Option<&str>| match (wanted, have) {
+        (None, []) => Ok(None),
+        (None, [only]) => Ok(Some((*only).to_owned())),
+        (None, several) => Err(located(
+            format!(
+                "`{name}` has several {what} entry points: {}",
+                listed(several.iter().copied())
+            ),
+            several,
+        )
+        .with_note(format!("choose one: `--{what} {}`", several[0]))),
+        (Some(wanted), have) if have.contains(&wanted) => Ok(Some(wanted.to_owned())),
+        (Some(wanted), have) => {
+            let missing =
+                Diagnostic::error(format!("`{name}` has no {what} entry point `{wanted}`"));
+            let near = nearest(wanted, have.iter().copied(), 1);
+            Err(match (near.first(), have) {
+                (Some(near), _) => missing.with_note(format!("there is a `{near}`")),
+                (None, []) => missing.with_note(format!("it has no {what} entry point at all")),
+                (None, have) => {
+                    missing.with_note(format!("it has {}", listed(have.iter().copied())))
+                }
+            })
+        }
+    };
+    let fragment = pick("fragment", &fragments, stages.fragment.as_deref())?;
+    let Some(fragment) = fragment else {
+        let none = Diagnostic::error(format!("`{name}` has no fragment entry point"));
+        let others: Vec<String> = module
+            .entry_points
+            .iter()
+            .map(|e| format!("`{}` ({})", e.name, stage_name(e.stage)))
+            .collect();
+        let functions: Vec<&str> = module
+            .functions
+            .iter()
+            .filter_map(|(_, f)| f.name.as_deref())
+            .collect();
+        return Err(if !others.is_empty() {
+            none.with_note(format!("its entry points are {}", others.join(", ")))
+        } else if !functions.is_empty() {
+            none.with_note(format!(
+                "it has the functions {}: mark one with `@fragment`",
+                listed(functions.into_iter().take(8))
+            ))
+        } else {
+            none.with_note("lodc works on a function marked `@fragment`")
+        });
+    };
+    let vertex = pick("vertex", &vertices, stages.vertex.as_deref())?;
+    if let Some(vertex) = &vertex {
+        check_link(name, text, module, vertex, &fragment)?;
+    }
+    Ok((vertex, fragment))
+}
+
+fn stage_name(stage: ShaderStage) -> String {
+    format!("{stage:?}").to_lowercase()
+}
+
+/// Every location that the fragment stage reads must be written by the vertex stage, in a type that fits.
+/// naga validates each stage alone.
+fn check_link(name: &str, text: &str, module: &Module, vertex: &str, fragment: &str) -> Result<()> {
+    let find = |stage, wanted: &str| {
+        let mut all = module.entry_points.iter();
+        all.position(|e| e.stage == stage && e.name == wanted)
+    };
+    let (Some(v), Some(f)) = (
+        find(ShaderStage::Vertex, vertex),
+        find(ShaderStage::Fragment, fragment),
+    ) else {
+        return Ok(());
+    };
+    let mut written = Vec::new();
+    if let Some(result) = &module.entry_points[v].function.result {
+        match (&result.binding, &module.types[result.ty].inner) {
+            (Some(Binding::Location { location, .. }), _) => written.push((*location, result.ty)),
+            (None, TypeInner::Struct { members, .. }) => {
+                for member in members {
+                    if let Some(Binding::Location { location, .. }) = member.binding {
+                        written.push((location, member.ty));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    for input in inputs(module, f, text) {
+        let Binding::Location { location, .. } = input.binding else {
+            continue;
+        };
+        let wrong = |message: String| {
+            let error = Diagnostic::error(message).with_source(name, text);
+            match input.span.to_range() {
+                Some(place) => error.with_label(place, format!("read by `{fragment}`")),
+                None => error,
+            }
+        };
+        match written.iter().find(|(at, _)| *at == location) {
+            None => {
+                return Err(wrong(format!(
+                    "`{fragment}` reads `{}` at location {location}, which `{vertex}` does not write",
+                    input.name
+                ))
+                .with_note(format!(
+                    "write it in `{vertex}`, or choose another vertex entry point with `--vertex`"
+                )));
+            }
+            Some((_, ty)) => {
+                let shape = |ty: Handle<Type>| {
+                    let inner = &module.types[ty].inner;
+                    let size = match inner {
+                        TypeInner::Vector { size, .. } => *size as u32,
+                        _ => 1,
+                    };
+                    (inner.scalar(), size)
+                };
+                let ((have, have_size), (want, want_size)) = (shape(*ty), shape(input.ty));
+                if have != want || have_size < want_size {
+                    return Err(wrong(format!(
+                        "`{fragment}` reads `{}` at location {location} in another type than `{vertex}` writes",
+                        input.name
+                    ))
+                    .with_note("give both the same type"));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::front::Source;
+
+    const TWO: &str = "
+        @vertex fn va() -> @builtin(position) vec4f { return vec4f(); }
+        @vertex fn vb() -> @builtin(position) vec4f { return vec4f(); }
+        @fragment fn fa() -> @location(0) vec4f { return vec4f(); }
+        @fragment fn fb() -> @location(0) vec4f { return vec4f(); }";
+
+    fn stages(vertex: Option<&str>, fragment: Option<&str>) -> Stages {
+        Stages {
+            vertex: vertex.map(str::to_owned),
+            fragment: fragment.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn one_entry_point_a_stage_needs_no_choice() {
+        let source = Source::parse(
+            "a.wgsl",
+            "@fragment fn f() -> @location(0) vec4f { return vec4f(); }",
+        )
+        .unwrap();
+        assert_eq!(
+            (source.vertex.as_deref(), source.fragment.as_str()),
+            (None, "f")
+        );
+        assert_eq!(source.fragment_entry().0, 0);
+        assert!(source.vertex_entry().is_none());
+    }
+
+    #[test]
+    fn several_are_listed_and_a_name_chooses() {
+        let error = Source::parse("a.wgsl", TWO).unwrap_err();
+        assert_eq!(
+            error.message,
+            "`a.wgsl` has several fragment entry points: `fa` and `fb`"
+        );
+        assert_eq!(error.labels.len(), 2);
+        assert_eq!(error.notes, ["choose one: `--fragment fa`"]);
+        let error = Source::parse_stages("a.wgsl", TWO, &stages(None, Some("fb"))).unwrap_err();
+        assert!(
+            error
+                .message
+                .contains("several vertex entry points: `va` and `vb`"),
+            "{error}"
+        );
+        let source = Source::parse_stages("a.wgsl", TWO, &stages(Some("vb"), Some("fb"))).unwrap();
+        assert_eq!(
+            (source.vertex_entry().unwrap().0, source.fragment_entry().0),
+            (1, 3)
+        );
+    }
+
+    #[test]
+    fn a_wrong_name_lists_what_there_is() {
+        let error = Source::parse_stages("a.wgsl", TWO, &stages(None, Some("lit"))).unwrap_err();
+        assert_eq!(error.message, "`a.wgsl` has no fragment entry point `lit`");
+        let error = Source::parse_stages("a.wgsl", TWO, &stages(None, Some("main"))).unwrap_err();
+        assert_eq!(error.notes, ["it has `fa` and `fb`"]);
+        let error = Source::parse_stages(
+            "a.wgsl",
+            TWO.replace("fb", "shade"),
+            &stages(None, Some("shader")),
+        )
+        .unwrap_err();
+        assert_eq!(error.notes, ["there is a `shade`"]);
+    }
+
+    #[test]
+    fn without_a_fragment_entry_point_the_error_lists_what_there_is() {
+        let none = |text: &str| Source::parse("a.wgsl", text).unwrap_err();
+        let error = none("@vertex fn v() -> @builtin(position) vec4f { return vec4f(); }");
+        assert_eq!(error.message, "`a.wgsl` has no fragment entry point");
+        assert_eq!(error.notes, ["its entry points are `v` (vertex)"]);
+        let error = none("fn shade() -> f32 { return 1.0; }");
+        assert_eq!(
+            error.notes,
+            ["it has the functions `shade`: mark one with `@fragment`"]
+        );
+        assert!(none("const a = 1;").notes[0].contains("@fragment"));
+    }
+
+    #[test]
+    fn the_stages_must_fit_together() {
+        let vertex = "struct V { @builtin(position) p: vec4f, @location(0) uv: vec2f }
+            @vertex fn vs() -> V { return V(); }\n";
+        let error = |fragment: &str| {
+            Source::parse("a.wgsl", format!("{vertex}{fragment}"))
+                .map(|_| ())
+                .map_err(|e| e.to_string())
+        };
+        assert!(error("@fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f { return vec4f(uv, uv); }").is_ok());
+        let missing = error("@fragment fn fs(@location(1) n: vec3f) -> @location(0) vec4f { return vec4f(n, 1.0); }").unwrap_err();
+        assert!(
+            missing.contains("`fs` reads `n` at location 1, which `vs` does not write"),
+            "{missing}"
+        );
+        assert!(missing.contains("a.wgsl:3:"), "{missing}");
+        let wider =
+            error("@fragment fn fs(@location(0) uv: vec4f) -> @location(0) vec4f { return uv; }")
+                .unwrap_err();
+        assert!(wider.contains("in another type"), "{wider}");
+    }
+
+    #[test]
+    fn inputs_are_flattened_with_their_places() {
+        let text = "struct I { @location(1) uv: vec2f, @builtin(front_facing) front: bool }
+            @fragment fn fs(i: I, @location(0) tint: vec3f) -> @location(0) vec4f { return vec4f(tint, i.uv.x); }";
+        let source = Source::parse("a.wgsl", text).unwrap();
+        let found: Vec<_> = inputs(&source.module, 0, text)
+            .into_iter()
+            .map(|i| (i.name.clone(), &text[i.span.to_range().unwrap()]))
+            .map(|(a, b)| (a, b.to_owned()))
+            .collect();
+        for (name, place) in &found {
+            assert_eq!(name, place);
+        }
+        assert_eq!(found.len(), 3);
+    }
+}

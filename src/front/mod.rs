@@ -1,0 +1,291 @@
+//! Reading shaders: a WGSL file becomes a validated naga module with its two entry points chosen.
+//!
+//! ```text
+//! path --read--> text --parse--> Module --validate--> ModuleInfo --choose--> Source
+//! ```
+//!
+//! Whatever is wrong is said at its place in the user's file.
+
+mod entry;
+mod feed;
+pub(crate) mod names;
+mod parse;
+mod vertex_stage;
+
+pub use entry::{Input, Stages, inputs};
+pub use feed::Feed;
+pub use parse::{CAPABILITIES, validate};
+pub use vertex_stage::VertexStage;
+
+use crate::{Diagnostic, Result};
+use naga::valid::ModuleInfo;
+use naga::{EntryPoint, Module, ShaderStage, Span};
+use std::path::{Path, PathBuf};
+
+/// A shader as the user wrote it, parsed and validated, with the entry points that lodc works on.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The file's name as the user gave it.
+    pub name: String,
+    /// Where it was read from; `None` for a text that came from no file.
+    pub path: Option<PathBuf>,
+    /// The text that spans point into.
+    pub text: String,
+    /// The module, with everything that the file declares.
+    pub module: Module,
+    /// What the validator found out about it.
+    pub info: ModuleInfo,
+    /// The name of the vertex entry point; `None` when the file has none, and lodc supplies the stage
+    /// ([`VertexStage`]).
+    pub vertex: Option<String>,
+    /// The name of the fragment entry point.
+    pub fragment: String,
+}
+
+impl Source {
+    /// Reads a `.wgsl` file with one fragment entry point and at most one vertex entry point.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is not WGSL, is not valid, or has another number of entry points.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::read_stages(path, &Stages::default())
+    }
+
+    /// As [`Source::read`], with entry points chosen by name.
+    ///
+    /// # Errors
+    /// As [`Source::read`], and when a name is not there.
+    pub fn read_stages(path: &Path, stages: &Stages) -> Result<Self> {
+        let name = path.display().to_string();
+        // Before the extension: a folder has none, and that is not what is wrong with it.
+        let text = read_text(path, "shader");
+        parse::expect_wgsl(path, &name, text.is_ok())?;
+        let mut source = Self::parse_stages(&name, text?, stages)?;
+        source.path = Some(path.to_owned());
+        Ok(source)
+    }
+
+    /// Parses a text; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// When it is not valid WGSL, or has not one fragment and at most one vertex entry point.
+    pub fn parse(name: &str, text: impl Into<String>) -> Result<Self> {
+        Self::parse_stages(name, text, &Stages::default())
+    }
+
+    /// As [`Source::parse`], with entry points chosen by name.
+    ///
+    /// # Errors
+    /// As [`Source::parse`], and when a name is not there.
+    pub fn parse_stages(name: &str, text: impl Into<String>, stages: &Stages) -> Result<Self> {
+        let text = text.into();
+        let (module, info) = parse::parse(name, &text)?;
+        let (vertex, fragment) = entry::choose(name, &text, &module, stages)?;
+        Ok(Self {
+            name: name.to_owned(),
+            path: None,
+            text,
+            module,
+            info,
+            vertex,
+            fragment,
+        })
+    }
+
+    /// The place of the fragment entry point in the module, and the entry point.
+    pub fn fragment_entry(&self) -> (usize, &EntryPoint) {
+        self.entry(ShaderStage::Fragment, &self.fragment)
+            .expect("the fragment entry point was chosen from this module")
+    }
+
+    /// The place of the vertex entry point in the module, and the entry point, when the file has one.
+    pub fn vertex_entry(&self) -> Option<(usize, &EntryPoint)> {
+        self.entry(ShaderStage::Vertex, self.vertex.as_deref()?)
+    }
+
+    fn entry(&self, stage: ShaderStage, name: &str) -> Option<(usize, &EntryPoint)> {
+        let mut entries = self.module.entry_points.iter().enumerate();
+        entries.find(|(_, e)| e.stage == stage && e.name == name)
+    }
+
+    /// An error at a place in this file.
+    pub fn error(
+        &self,
+        message: impl Into<String>,
+        span: Span,
+        remark: impl Into<String>,
+    ) -> Box<Diagnostic> {
+        self.locate(Diagnostic::error(message), span, remark)
+    }
+
+    /// Puts a diagnostic at a place in this file; without a defined span, at the file alone.
+    pub fn locate(
+        &self,
+        diagnostic: Box<Diagnostic>,
+        span: Span,
+        remark: impl Into<String>,
+    ) -> Box<Diagnostic> {
+        let diagnostic = diagnostic.with_source(&self.name, &self.text);
+        match span.to_range() {
+            Some(range) => diagnostic.with_label(range, remark),
+            None => diagnostic,
+        }
+    }
+}
+
+/// Reads a text file that the user named. `kind` says what it should be: `shader`, `scene`.
+///
+/// # Errors
+/// When it is not there, a folder, not readable, or not text.
+pub fn read_text(path: &Path, kind: &str) -> Result<String> {
+    let name = path.display();
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(_) if path.is_dir() => {
+            return Err(
+                Diagnostic::error(format!("`{name}` is a folder, not a {kind} file"))
+                    .with_note(format!("name a {kind} file in it")),
+            );
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let missing = Diagnostic::error(format!("there is no {kind} file `{name}`"));
+            return Err(match similar_file(path) {
+                Some(near) => missing.with_note(format!("there is a `{near}` beside it")),
+                None => {
+                    missing.with_note("check the path, which is relative to the current folder")
+                }
+            });
+        }
+        Err(error) => {
+            return Err(Diagnostic::error(format!(
+                "cannot read the {kind} file `{name}`: {error}"
+            )));
+        }
+    };
+    if bytes.starts_with(&[3, 2, 35, 7]) || bytes.starts_with(&[7, 35, 2, 3]) {
+        return Err(Diagnostic::error(format!("`{name}` is a SPIR-V binary"))
+            .with_note("this build reads WGSL text only"));
+    }
+    match String::from_utf8(bytes) {
+        Ok(text) if text.contains('\0') => Err(Diagnostic::error(format!(
+            "`{name}` is a binary file, not a {kind}: it has a zero byte at {}",
+            text.find('\0').unwrap_or_default()
+        ))),
+        Ok(text) => Ok(match text.strip_prefix('\u{feff}') {
+            Some(rest) => rest.to_owned(),
+            None => text,
+        }),
+        Err(error) => Err(Diagnostic::error(format!(
+            "`{name}` is not text: byte {} is not UTF-8",
+            error.utf8_error().valid_up_to()
+        ))
+        .with_note(format!("a {kind} is a text file in UTF-8"))),
+    }
+}
+
+/// The name of a file in the same folder that the user may have meant.
+fn similar_file(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_str()?;
+    let folder = match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .ok()?
+        .flatten()
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect();
+    names.sort();
+    let near = names::nearest(wanted, names.iter().map(String::as_str), 1);
+    near.first().map(|name| (*name).to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder of its own for a test, removed at the end.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path =
+                std::env::temp_dir().join(format!("lodc-front-{name}-{}", std::process::id()));
+            std::fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+            let path = self.0.join(name);
+            std::fs::write(&path, bytes).unwrap();
+            path
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    const PLAIN: &[u8] = b"@fragment fn fs() -> @location(0) vec4f { return vec4f(1.0); }";
+
+    #[test]
+    fn a_file_is_read() {
+        let folder = Folder::new("read");
+        let path = folder.write("a.wgsl", PLAIN);
+        let source = Source::read(&path).unwrap();
+        assert_eq!(source.path.as_deref(), Some(path.as_path()));
+        assert_eq!(source.fragment, "fs");
+        // An editor's byte order mark is no part of the text.
+        let marked = [b"\xef\xbb\xbf".as_slice(), PLAIN].concat();
+        assert_eq!(
+            Source::read(&folder.write("b.wgsl", &marked))
+                .unwrap()
+                .text
+                .as_bytes(),
+            PLAIN
+        );
+    }
+
+    #[test]
+    fn what_is_no_shader_file_is_said() {
+        let folder = Folder::new("bad");
+        let bad = |name: &str, bytes: &[u8]| Source::read(&folder.write(name, bytes)).unwrap_err();
+        for (error, part) in [
+            (
+                Source::read(&folder.0).unwrap_err(),
+                "is a folder, not a shader file",
+            ),
+            (
+                Source::read(&folder.0.join("x.wgsl")).unwrap_err(),
+                "there is no shader file",
+            ),
+            (bad("empty.wgsl", b""), "is empty"),
+            (bad("zero.wgsl", b"fn a\0"), "is a binary file"),
+            (
+                bad("latin.wgsl", b"fn a \xff\xfe"),
+                "is not text: byte 5 is not UTF-8",
+            ),
+            (
+                bad("a.spv.wgsl", &[3, 2, 35, 7, 0, 0]),
+                "is a SPIR-V binary",
+            ),
+            (
+                bad("a.glsl", PLAIN),
+                "is GLSL, which this build does not read",
+            ),
+            (bad("a.txt", PLAIN), "is not a `.wgsl` file"),
+        ] {
+            assert!(error.message.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_misspelt_file_name_is_found() {
+        let folder = Folder::new("near");
+        folder.write("brick.wgsl", PLAIN);
+        let error = Source::read(&folder.0.join("brik.wgsl")).unwrap_err();
+        assert_eq!(error.notes, ["there is a `brick.wgsl` beside it"]);
+    }
+}

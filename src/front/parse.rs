@@ -1,0 +1,389 @@
+//! WGSL to a validated module, with naga's errors as diagnostics in the user's file.
+
+use super::names::whole_word;
+use crate::{Diagnostic, Result};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{Block, Module, Span, Statement, WithSpan};
+use std::error::Error;
+use std::path::Path;
+
+/// What a shader may use: all that an engine could switch on. The evaluator refuses what it does not run
+/// with a message of its own, at the expression.
+pub const CAPABILITIES: Capabilities = Capabilities::all();
+
+/// The stack that naga gets. Its parser recurses for nested source and its own limits assume the main
+/// thread of an optimised build; this is far more than those limits can use, and only touched pages count.
+const STACK: usize = 256 << 20;
+
+/// The largest shader text, in bytes. Bevy's PBR is 0.12 MB composed; a text beyond this is a mistake, and
+/// would only exhaust the stack.
+const LARGEST: usize = 4 << 20;
+
+/// How deep statements may be nested. Everything behind the reader walks blocks recursively, on threads
+/// with the stack that the system gives.
+const DEEPEST: usize = 256;
+
+/// Validates a module as every module that lodc reads or writes is validated.
+///
+/// # Errors
+/// As naga's validator.
+pub fn validate(
+    module: &Module,
+) -> std::result::Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+    Validator::new(ValidationFlags::all(), CAPABILITIES)
+        .validate(module)
+        .map_err(Box::new)
+}
+
+/// Refuses files that are not WGSL by their names.
+pub(super) fn expect_wgsl(path: &Path, name: &str, readable: bool) -> Result<()> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    if !readable || extension.eq_ignore_ascii_case("wgsl") {
+        return Ok(());
+    }
+    let lower = extension.to_ascii_lowercase();
+    let language = match lower.as_str() {
+        "glsl" | "vert" | "frag" | "vs" | "fs" | "comp" => "GLSL",
+        "hlsl" | "fx" | "hlsli" | "cginc" | "shader" => "HLSL",
+        "wesl" => "WESL",
+        "slang" => "Slang",
+        "metal" | "msl" => "Metal",
+        "spv" => "SPIR-V",
+        _ => "",
+    };
+    Err(match language {
+        "" => Diagnostic::error(format!("`{name}` is not a `.wgsl` file"))
+            .with_note("lodc reads WGSL shaders; give the file the extension `.wgsl` if it is one"),
+        language => Diagnostic::error(format!(
+            "`{name}` is {language}, which this build does not read"
+        ))
+        .with_note("translate it to WGSL first, with `naga`, `tint` or `glslang` and `naga`"),
+    })
+}
+
+/// Parses and validates a text.
+pub(super) fn parse(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
+    if text.trim().is_empty() {
+        return Err(Diagnostic::error(format!("`{name}` is empty")).with_note(
+            "a material shader has at least a fragment entry point: `@fragment fn ...`",
+        ));
+    }
+    if text.len() > LARGEST {
+        return Err(Diagnostic::error(format!(
+            "`{name}` has {} bytes, more than the {LARGEST} that lodc reads",
+            text.len()
+        )));
+    }
+    // A thread of its own gives naga its stack, and turns a panic of naga into an error here.
+    std::thread::scope(|scope| {
+        std::thread::Builder::new()
+            .stack_size(STACK)
+            .spawn_scoped(scope, || parse_here(name, text))
+            .map_err(|error| Diagnostic::error(format!("cannot start a thread: {error}")))?
+            .join()
+            .unwrap_or_else(|_| {
+                Err(
+                    Diagnostic::error(format!("naga broke down on `{name}`")).with_note(
+                        "this is a bug in naga's WGSL reader: please report it with the file",
+                    ),
+                )
+            })
+    })
+}
+
+fn parse_here(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|error| {
+        if let Some(foreign) = foreign_directive(name, text) {
+            return foreign;
+        }
+        let located = Diagnostic::error(uncapitalised(error.message())).with_source(name, text);
+        let labelled = error
+            .labels()
+            .fold(located, |d, (span, remark)| at(d, span, remark));
+        error.notes().fold(labelled, |d, note| d.with_reason(note))
+    })?;
+    // Here, where the stack is deep enough even to drop what is too deep for everyone else.
+    let functions = module.functions.iter().map(|(_, f)| f);
+    let entries = module.entry_points.iter().map(|e| &e.function);
+    for function in functions.chain(entries) {
+        if let Some(place) = too_deep(&function.body, DEEPEST) {
+            let error =
+                Diagnostic::error(format!("statements are nested more than {DEEPEST} deep"))
+                    .with_source(name, text);
+            return Err(at(error, place, "too deep from here")
+                .with_note("split the function, or turn a chain of `else if` into a `switch`"));
+        }
+    }
+    let info = validate(&module).map_err(|error| {
+        // The outermost says which function, the innermost what is wrong.
+        let mut reasons = Vec::new();
+        let mut next: Option<&dyn Error> = error.as_inner().source();
+        while let Some(reason) = next {
+            reasons.push(reason.to_string());
+            next = reason.source();
+        }
+        let message = uncapitalised(&error.as_inner().to_string());
+        let located = Diagnostic::error(message).with_source(name, text);
+        let labelled = error
+            .spans()
+            .fold(located, |d, (span, remark)| at(d, *span, readable(remark)));
+        let labelled = match subject(error.as_inner()) {
+            Some(subject) if labelled.labels.is_empty() => {
+                match whole_word(text, 0..text.len(), subject) {
+                    Some(place) => labelled.with_label(place, "in this"),
+                    None => labelled,
+                }
+            }
+            _ => labelled,
+        };
+        reasons
+            .iter()
+            .fold(labelled, |d, reason| d.with_reason(uncapitalised(reason)))
+    })?;
+    Ok((module, info))
+}
+
+/// Where statements are nested deeper than `left` more blocks.
+fn too_deep(block: &Block, left: usize) -> Option<Span> {
+    block.span_iter().find_map(|(statement, span)| {
+        let inner: Vec<&Block> = match statement {
+            Statement::Block(block) => vec![block],
+            Statement::If { accept, reject, .. } => vec![accept, reject],
+            Statement::Switch { cases, .. } => cases.iter().map(|case| &case.body).collect(),
+            Statement::Loop {
+                body, continuing, ..
+            } => vec![body, continuing],
+            _ => return None,
+        };
+        match left {
+            0 => Some(*span),
+            left => inner.into_iter().find_map(|b| too_deep(b, left - 1)),
+        }
+    })
+}
+
+/// What is wrong when the text is not plain WGSL but one of its preprocessed or modular relatives.
+/// Asked only after naga has refused the text, so that a comment or a macro-like name is no trap.
+fn foreign_directive(name: &str, text: &str) -> Option<Box<Diagnostic>> {
+    let mut offset = 0;
+    for line in text.split_inclusive('\n') {
+        let start = offset + line.len() - line.trim_start().len();
+        offset += line.len();
+        let words = line.trim();
+        let directive = words.split_whitespace().next().unwrap_or("");
+        let place = start..start + words.len();
+        if directive.starts_with('#') {
+            let what = match directive {
+                "#import" | "#define_import_path" => "imports are",
+                _ => "preprocessor directives are",
+            };
+            return Some(
+                Diagnostic::error(format!("{what} not read by this build"))
+                    .with_source(name, text)
+                    .with_label(place, "not WGSL")
+                    .with_note(
+                        "compose the module first, with `naga_oil`, and give lodc the plain WGSL",
+                    ),
+            );
+        }
+        if directive == "import" && words.ends_with(';') {
+            return Some(
+                Diagnostic::error("imports are not read by this build")
+                    .with_source(name, text)
+                    .with_label(place, "this is WESL, not WGSL")
+                    .with_note("link the package first, with `wesl`, and give lodc the plain WGSL"),
+            );
+        }
+    }
+    None
+}
+
+fn at(diagnostic: Box<Diagnostic>, span: Span, remark: impl Into<String>) -> Box<Diagnostic> {
+    match span.to_range() {
+        Some(range) => diagnostic.with_label(range, remark),
+        None => diagnostic,
+    }
+}
+
+/// The name of what a validation error is about; naga gives some of them no place.
+fn subject(error: &ValidationError) -> Option<&str> {
+    match error {
+        ValidationError::Type { name, .. }
+        | ValidationError::Constant { name, .. }
+        | ValidationError::Override { name, .. }
+        | ValidationError::GlobalVariable { name, .. }
+        | ValidationError::Function { name, .. }
+        | ValidationError::EntryPoint { name, .. } => Some(name),
+        _ => None,
+    }
+}
+
+/// naga's remark on a place without the Rust type and arena index of what is there:
+/// `naga::ir::Expression [3]` says nothing to a shader's author.
+fn readable(remark: &str) -> &str {
+    match remark.starts_with("naga::") {
+        true => "here",
+        false => remark,
+    }
+}
+
+/// A message of naga in the manner of ours: no capital, no full stop, and no arena indices (`[12]`), which
+/// say nothing to a shader's author.
+fn uncapitalised(message: &str) -> String {
+    let mut plain = String::new();
+    let mut rest = message.trim_end_matches('.');
+    while let Some(open) = rest.find(" [") {
+        let inside = &rest[open + 2..];
+        let digits = inside.len()
+            - inside
+                .trim_start_matches(|c: char| c.is_ascii_digit())
+                .len();
+        let index = digits > 0 && inside[digits..].starts_with(']');
+        let end = open + if index { digits + 3 } else { 2 };
+        plain.push_str(&rest[..if index { open } else { end }]);
+        rest = &rest[end..];
+    }
+    plain.push_str(rest);
+    // `WGSL`, `I32`: not a sentence's first word.
+    let mut chars = plain.chars();
+    match (chars.next(), chars.as_str()) {
+        (Some(first), rest) if rest.starts_with(|c: char| c.is_lowercase() || c == ' ') => {
+            first.to_lowercase().chain(rest.chars()).collect()
+        }
+        _ => plain,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> Box<Diagnostic> {
+        parse("a.wgsl", text).expect_err(text)
+    }
+
+    #[test]
+    fn parse_errors_point_into_the_text() {
+        let text = "@fragment fn fs() -> @location(0) vec4f {\n    return vec4f(missing);\n}\n";
+        let error = refused(text);
+        assert!(error.message.contains("missing"), "{error}");
+        assert_eq!(&text[error.labels[0].0.clone()], "missing");
+        assert!(error.to_string().contains("a.wgsl:2:18"), "{error}");
+    }
+
+    #[test]
+    fn notes_of_naga_are_kept() {
+        let error = refused("fn f() -> f32 { return cross(vec2(0., 1.), vec2(0., 1.)); }");
+        let text = error.to_string();
+        assert!(text.contains("note: allowed type: vec3<f32>"), "{text}");
+    }
+
+    #[test]
+    fn validation_errors_point_into_the_text_and_give_the_reason() {
+        let text = "@fragment fn fs(@location(0) a: f32, @location(0) b: f32) -> @location(0) vec4f { return vec4f(a + b); }";
+        let error = refused(text);
+        let rendered = error.to_string();
+        assert!(rendered.contains("a.wgsl:1:"), "{rendered}");
+        assert!(rendered.contains("location"), "{rendered}");
+        assert!(!rendered.contains("naga::"), "{rendered}");
+        assert!(error.message.starts_with(char::is_lowercase), "{rendered}");
+    }
+
+    #[test]
+    fn empty_files_are_called_empty() {
+        for text in ["", " \n\t\n"] {
+            assert_eq!(refused(text).message, "`a.wgsl` is empty");
+        }
+    }
+
+    #[test]
+    fn relatives_of_wgsl_are_named() {
+        for (text, message, place) in [
+            (
+                "#import bevy_pbr::mesh\n",
+                "imports are",
+                "#import bevy_pbr::mesh",
+            ),
+            (
+                "fn a() {}\n  #ifdef X\nfn b() {}\n",
+                "preprocessor",
+                "#ifdef X",
+            ),
+            (
+                "import super::a::b;\n",
+                "imports are",
+                "import super::a::b;",
+            ),
+        ] {
+            let error = refused(text);
+            assert!(error.message.starts_with(message), "{error}");
+            assert_eq!(&text[error.labels[0].0.clone()], place);
+        }
+        // In a comment it is no directive.
+        assert!(
+            refused("// #import x\nfn f( {}")
+                .message
+                .contains("expected")
+        );
+        assert!(parse("a.wgsl", "/*\n#import x\n*/ fn f() {}").is_ok());
+    }
+
+    #[test]
+    fn other_languages_are_named() {
+        for (file, part) in [
+            ("a.frag", "GLSL"),
+            ("a.hlsl", "HLSL"),
+            ("a.txt", "not a `.wgsl` file"),
+        ] {
+            let error = expect_wgsl(Path::new(file), file, true).unwrap_err();
+            assert!(error.message.contains(part), "{error}");
+        }
+        assert!(expect_wgsl(Path::new("a.WGSL"), "a", true).is_ok());
+    }
+
+    #[test]
+    fn messages_of_naga_are_put_in_our_manner() {
+        for (naga, ours) in [
+            ("Function [12] 'f' is invalid", "function 'f' is invalid"),
+            ("Expression [3] of [4] is bad.", "expression of is bad"),
+            ("WGSL is [x]", "WGSL is [x]"),
+            ("a [", "a ["),
+            ("", ""),
+        ] {
+            assert_eq!(uncapitalised(naga), ours);
+        }
+    }
+
+    #[test]
+    fn deep_nesting_is_an_error_or_fine_and_never_a_crash() {
+        let n = 50_000;
+        for text in [
+            format!(
+                "fn f() -> f32 {{ return {}1.0{}; }}",
+                "(".repeat(n),
+                ")".repeat(n)
+            ),
+            format!("fn f() -> f32 {{ return {}1.0; }}", "-".repeat(n)),
+            format!("fn f() -> f32 {{ return 1.0{}; }}", " + 1.0".repeat(n)),
+            format!("fn f() {{ {}{} }}", "{".repeat(n), "}".repeat(n)),
+            format!("fn f(a: bool) {{ {} {{}} }}", "if a {} else ".repeat(n)),
+            format!(
+                "fn f(a: bool) {{ {} {} }}",
+                "if a {".repeat(n),
+                "}".repeat(n)
+            ),
+            format!(
+                "fn f() -> f32 {{ return {}1.0{}; }}",
+                "abs(".repeat(n),
+                ")".repeat(n)
+            ),
+            format!(
+                "var<private> a: {}f32{};",
+                "array<".repeat(n),
+                ", 1>".repeat(n)
+            ),
+        ] {
+            let _ = parse("a.wgsl", &text);
+        }
+    }
+}
