@@ -11,6 +11,8 @@
 //! Positions are snapped to 1/256 pixel for coverage (top-left rule) and exact for interpolation.
 
 mod quads;
+#[cfg(test)]
+mod tests;
 mod triangle;
 mod vertices;
 

@@ -606,3 +606,449 @@ pub(super) fn cube_direction(face: usize, s: f32, t: f32) -> [f32; 3] {
         _ => [-s, -t, -1.0],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::image::Image;
+
+    fn image(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Image {
+        let texels = (0..height)
+            .flat_map(|y| (0..width).map(move |x| (x, y)))
+            .map(|(x, y)| [value(x, y), y as f32, 0.0, 1.0])
+            .collect();
+        Image {
+            width,
+            height,
+            texels,
+        }
+    }
+
+    /// Red is the column, green the row.
+    fn ramp(width: u32, height: u32) -> Texture {
+        Texture::new(Dimension::D2, vec![image(width, height, |x, _| x as f32)]).unwrap()
+    }
+
+    /// Six 4 x 4 faces; red is a function of the direction, which has no seams.
+    fn cube(value: impl Fn([f32; 3]) -> f32) -> Texture {
+        let face = |face: usize| {
+            image(4, 4, |x, y| {
+                value(cube_direction(
+                    face,
+                    (x as f32 + 0.5) / 4.0,
+                    (y as f32 + 0.5) / 4.0,
+                ))
+            })
+        };
+        Texture::new(Dimension::Cube, (0..6).map(face).collect()).unwrap()
+    }
+
+    const ONE: Mask = Mask([1, 0, 0, 0]);
+
+    /// Samples in lane 0.
+    fn one<'r>(
+        texture: &Texture,
+        sampler: &Sampler,
+        at: &[f32],
+        edit: impl Fn(&mut Request<'r>),
+    ) -> [f32; 4] {
+        let coordinates: Vec<Floats> = at.iter().map(|&c| [c; LANES]).collect();
+        let coordinates: Vec<&Floats> = coordinates.iter().collect();
+        let mut edited = Request::implicit(&[]);
+        edit(&mut edited);
+        let request = Request {
+            coordinates: &coordinates,
+            ..edited
+        };
+        let mut out = [[0.0; LANES]; 4];
+        texture.sample(sampler, &request, ONE, &mut out);
+        out.map(|c| c[0])
+    }
+
+    fn wrapping(wrap: Wrap) -> Sampler {
+        Sampler {
+            wrap: [wrap; 3],
+            ..Sampler::default()
+        }
+    }
+
+    fn nearest(wrap: Wrap) -> Sampler {
+        Sampler {
+            linear_magnification: false,
+            linear_minification: false,
+            linear_mip: false,
+            ..wrapping(wrap)
+        }
+    }
+
+    #[test]
+    fn bilinear_weights() {
+        let texture = ramp(4, 4);
+        // Texel centres are at (i + 0.5) / 4.
+        for (u, v, expected) in [
+            (0.375, 0.125, [1.0, 0.0]),
+            (0.5, 0.5, [1.5, 1.5]),
+            (0.4375, 0.8125, [1.25, 2.75]),
+        ] {
+            let got = one(&texture, &Sampler::default(), &[u, v], |_| {});
+            assert_eq!(got[..2], expected);
+            assert_eq!(got[2..], [0.0, 1.0]);
+        }
+    }
+
+    #[test]
+    fn wrap_modes() {
+        let texture = ramp(4, 1);
+        let at = |wrap, u: f32| one(&texture, &nearest(wrap), &[u, 0.5], |_| {})[0];
+        let columns = |wrap| [-1.2, -0.3, -0.1, 0.1, 0.3, 0.9, 1.0, 1.3, 2.1].map(|u| at(wrap, u));
+        assert_eq!(
+            columns(Wrap::Repeat),
+            [3.0, 2.0, 3.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0]
+        );
+        assert_eq!(
+            columns(Wrap::ClampToEdge),
+            [0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 3.0, 3.0, 3.0]
+        );
+        assert_eq!(
+            columns(Wrap::MirrorRepeat),
+            [3.0, 1.0, 0.0, 0.0, 1.0, 3.0, 3.0, 2.0, 0.0]
+        );
+        // Linear filtering at the edge, u = 0: halfway between texel 0 and its neighbour on the left.
+        let linear = |wrap| one(&texture, &wrapping(wrap), &[0.0, 0.5], |_| {})[0];
+        assert_eq!(linear(Wrap::Repeat), 1.5);
+        assert_eq!(linear(Wrap::ClampToEdge), 0.0);
+        assert_eq!(linear(Wrap::MirrorRepeat), 0.0);
+    }
+
+    #[test]
+    fn offsets_move_by_texels() {
+        let texture = ramp(4, 4);
+        let at = |wrap, offset: i32| {
+            one(&texture, &wrapping(wrap), &[0.375, 0.375], |r| {
+                r.offset = [offset, 0, 0];
+            })[0]
+        };
+        assert_eq!(at(Wrap::Repeat, 1), 2.0);
+        assert_eq!(at(Wrap::Repeat, -2), 3.0);
+        assert_eq!(at(Wrap::Repeat, 7), 0.0);
+        assert_eq!(at(Wrap::ClampToEdge, 7), 3.0);
+        assert_eq!(at(Wrap::MirrorRepeat, -2), 0.0);
+        assert_eq!(at(Wrap::MirrorRepeat, 3), 3.0);
+    }
+
+    #[test]
+    fn any_coordinate_is_safe() {
+        let flat = Texture::new(Dimension::D2, vec![image(5, 3, |_, _| 0.5)])
+            .unwrap()
+            .with_mip_chain();
+        let sky = cube(|_| 0.5).with_mip_chain();
+        let volume = Texture::new(Dimension::D3, vec![image(5, 3, |_, _| 0.5); 3]).unwrap();
+        let hard = [
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            3e38,
+            -3e38,
+            1e10,
+            -1e-40,
+            -1e-8,
+            0.0,
+        ];
+        for wrap in [Wrap::Repeat, Wrap::ClampToEdge, Wrap::MirrorRepeat] {
+            for sampler in [wrapping(wrap), nearest(wrap)] {
+                for a in hard {
+                    for b in hard {
+                        for texture in [&flat, &sky, &volume] {
+                            let mut level = [a; LANES];
+                            level[0] = b;
+                            for offset in [0, i32::MAX, i32::MIN] {
+                                let got = one(texture, &sampler, &[a, b, 0.3], |r| {
+                                    r.offset = [offset, 1, 0];
+                                    r.detail = Detail::Exact(&level);
+                                });
+                                assert_eq!(got[0], 0.5, "{wrap:?} {a} {b}");
+                            }
+                            let got = one(texture, &sampler, &[a, b, 0.3], |_| {});
+                            assert_eq!(got[0], 0.5);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A chain of 16, 8, 4, 2 and 1 texels whose red is the level.
+    fn staircase() -> Texture {
+        let mut texture = ramp(16, 16).with_mip_chain();
+        for (i, level) in texture.levels.iter_mut().enumerate() {
+            level.texels.fill([i as f32, 0.0, 0.0, 1.0]);
+        }
+        texture
+    }
+
+    #[test]
+    fn level_of_detail_at_known_scales() {
+        let texture = staircase();
+        let trilinear = Sampler::default();
+        // `step` texels a pixel along x, half of that along y: the longer counts.
+        let implicit = |sampler: &Sampler, step: f32, bias: Option<&Floats>| {
+            let mut u = [0.0; LANES];
+            let mut v = [0.0; LANES];
+            for lane in 0..4 {
+                u[lane] = 0.25 + (lane % 2) as f32 * step / 16.0;
+                v[lane] = 0.25 + (lane / 2) as f32 * 0.5 * step / 16.0;
+            }
+            let coordinates = [&u, &v];
+            let mut request = Request::implicit(&coordinates);
+            request.detail = Detail::Implicit { bias };
+            let mut out = [[0.0; LANES]; 4];
+            texture.sample(sampler, &request, Mask([15, 0, 0, 0]), &mut out);
+            assert!(
+                out[0][..4].iter().all(|&r| r == out[0][0]),
+                "one level a quad"
+            );
+            out[0][0]
+        };
+        for (step, level) in [
+            (0.25, 0.0),
+            (1.0, 0.0),
+            (2.0, 1.0),
+            (4.0, 2.0),
+            (16.0, 4.0),
+            (64.0, 4.0),
+        ] {
+            assert_eq!(implicit(&trilinear, step, None), level, "{step}");
+        }
+        let half = implicit(&trilinear, 2.0_f32.sqrt(), None);
+        assert!((half - 0.5).abs() < 1e-6, "{half}");
+        assert_eq!(implicit(&trilinear, 2.0, Some(&[1.5; LANES])), 2.5);
+        assert_eq!(implicit(&trilinear, 0.5, Some(&[1.5; LANES])), 0.5);
+        assert_eq!(implicit(&trilinear, 8.0, Some(&[-9.0; LANES])), 0.0);
+        let steps = Sampler {
+            linear_mip: false,
+            ..trilinear
+        };
+        assert_eq!(implicit(&steps, 2.8, None), 1.0);
+        assert_eq!(implicit(&steps, 2.9, None), 2.0);
+
+        let exact = |level: f32| {
+            one(&texture, &trilinear, &[0.3, 0.3], |r| {
+                r.detail = Detail::Exact(if level == 1.25 {
+                    &[1.25; LANES]
+                } else {
+                    &[9.0; LANES]
+                });
+            })[0]
+        };
+        assert_eq!((exact(1.25), exact(9.0)), (1.25, 4.0));
+        let gradients = one(&texture, &trilinear, &[0.3, 0.3], |r| {
+            r.detail = Detail::Gradients {
+                ddx: &[&[0.0; LANES], &[0.125; LANES]],
+                ddy: &[&[0.5; LANES], &[0.0; LANES]],
+            };
+        });
+        assert_eq!(gradients[0], 3.0);
+    }
+
+    #[test]
+    fn magnification_and_minification_filters_differ() {
+        let texture = ramp(4, 1);
+        let sampler = Sampler {
+            linear_magnification: false,
+            ..wrapping(Wrap::ClampToEdge)
+        };
+        let at = |level: &Floats| {
+            one(&texture, &sampler, &[0.45, 0.5], |r| {
+                r.detail = Detail::Exact(level)
+            })[0]
+        };
+        assert_eq!(at(&[0.0; LANES]), 1.0);
+        assert!((at(&[0.5; LANES]) - 1.3).abs() < 1e-6);
+    }
+
+    #[test]
+    fn compares_depth_then_filters() {
+        let texture = ramp(4, 1);
+        let shadow = |reference: &Floats, comparison| {
+            let sampler = Sampler {
+                comparison,
+                ..wrapping(Wrap::ClampToEdge)
+            };
+            one(&texture, &sampler, &[0.4375, 0.5], |r| {
+                r.reference = Some(reference);
+                r.detail = Detail::Zero;
+            })[0]
+        };
+        // Texels 1 and 2 with weights 3/4 and 1/4.
+        assert_eq!(shadow(&[1.5; LANES], Comparison::LessEqual), 0.25);
+        assert_eq!(shadow(&[2.0; LANES], Comparison::LessEqual), 0.25);
+        assert_eq!(shadow(&[2.0; LANES], Comparison::Less), 0.0);
+        assert_eq!(shadow(&[1.5; LANES], Comparison::Greater), 0.75);
+        assert_eq!(shadow(&[1.0; LANES], Comparison::Equal), 0.75);
+        assert_eq!(shadow(&[f32::NAN; LANES], Comparison::LessEqual), 0.0);
+        assert_eq!(shadow(&[f32::NAN; LANES], Comparison::Always), 1.0);
+    }
+
+    #[test]
+    fn gathers_in_order() {
+        let texture = ramp(4, 4);
+        let gather = |component, reference: Option<&Floats>| {
+            one(&texture, &Sampler::default(), &[0.5, 0.5], |r| {
+                r.gather = Some(component);
+                r.reference = reference;
+            })
+        };
+        assert_eq!(gather(0, None), [1.0, 2.0, 2.0, 1.0]);
+        assert_eq!(gather(1, None), [2.0, 2.0, 1.0, 1.0]);
+        assert_eq!(gather(0, Some(&[1.5; LANES])), [0.0, 1.0, 1.0, 0.0]);
+        let sky = cube(|d| d[1]);
+        let all = one(&sky, &Sampler::default(), &[0.0, 0.0, 1.0], |r| {
+            r.gather = Some(0)
+        });
+        assert_eq!(all, [-0.25, -0.25, 0.25, 0.25]);
+    }
+
+    #[test]
+    fn cube_faces() {
+        // Each face its own number: the axes, and directions that lean towards another.
+        let faces = (0..6).map(|f| image(2, 2, move |_, _| f as f32)).collect();
+        let texture = Texture::new(Dimension::Cube, faces).unwrap();
+        let directions = [
+            [2.0, 0.3, -0.4],
+            [-3.0, 1.0, 1.0],
+            [0.1, 0.5, 0.2],
+            [0.1, -0.5, 0.2],
+            [0.0, 0.0, 7.0],
+            [0.5, -0.5, -0.6],
+        ];
+        for (face, direction) in directions.iter().enumerate() {
+            let got = one(&texture, &nearest(Wrap::Repeat), direction, |_| {});
+            assert_eq!(got[0], face as f32);
+        }
+        // Every point of every face comes back to its own coordinates.
+        for face in 0..6 {
+            let (s, t) = (0.3, 0.8);
+            let (found, found_s, found_t) = cube_face(cube_direction(face, s, t));
+            assert_eq!(found, face);
+            assert!((found_s - s).abs() < 1e-6 && (found_t - t).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn cube_edges_are_seamless() {
+        let texture = cube(|d| d[0] + 2.0 * d[1] + 4.0 * d[2]);
+        let sampler = Sampler::default();
+        let at = |d: [f32; 3]| one(&texture, &sampler, &d, |_| {})[0];
+        // Just on both sides of the edges between +z and +x, and +z and +y, the same value.
+        // (Up to the outermost texels' centres: at a corner there are only three texels.)
+        for i in 0..16 {
+            let along = -0.75 + 0.1 * i as f32;
+            for (a, b) in [
+                ([1.000_01, along, 1.0], [1.0, along, 1.000_01]),
+                ([along, 1.000_01, 1.0], [along, 1.0, 1.000_01]),
+                ([-1.000_01, along, -1.0], [-1.0, along, -1.000_01]),
+            ] {
+                assert!((at(a) - at(b)).abs() < 1e-3, "{a:?}: {} {}", at(a), at(b));
+            }
+        }
+        // On an edge it is the mean of the faces' outermost texels.
+        assert!((at([1.0, 0.25, 1.0]) - (0.875 + 0.5 + 3.5)).abs() < 0.2);
+    }
+
+    #[test]
+    fn cube_level_of_detail_uses_projected_gradients() {
+        let mut texture = cube(|_| 0.0).with_mip_chain();
+        for (i, level) in texture.levels.iter_mut().enumerate() {
+            level.texels.fill([i as f32, 0.0, 0.0, 1.0]);
+        }
+        let sampler = Sampler::default();
+        // At (0, 0, 2), a step of 2 along x is a step of 1 of sc / ma, half the face: two texels.
+        let along = |ddx: &[&Floats]| {
+            one(&texture, &sampler, &[0.0, 0.0, 2.0], |r| {
+                r.detail = Detail::Gradients {
+                    ddx,
+                    ddy: &[&[0.0; LANES], &[0.0; LANES], &[0.0; LANES]],
+                };
+            })[0]
+        };
+        let (zero, two) = ([0.0; LANES], [2.0; LANES]);
+        assert_eq!(along(&[&two, &zero, &zero]), 1.0);
+        // A step along the axis itself does not move the point on the face.
+        assert_eq!(along(&[&zero, &zero, &two]), 0.0);
+    }
+
+    #[test]
+    fn array_layers_are_clamped() {
+        let layers = (0..3).map(|l| image(1, 1, move |_, _| l as f32)).collect();
+        let texture = Texture::new(Dimension::D2, layers).unwrap();
+        for (layer, expected) in [(0, 0.0), (2, 2.0), (-5, 0.0), (i32::MAX, 2.0)] {
+            let layers = [layer; LANES];
+            let got = one(&texture, &Sampler::default(), &[0.5, 0.5], |r| {
+                r.layer = Some(&layers)
+            });
+            assert_eq!(got[0], expected);
+        }
+        assert_eq!((texture.layers(), texture.size(0)), (3, [1, 1, 1]));
+        let faces = (0..12).map(|f| image(1, 1, move |_, _| f as f32)).collect();
+        let texture = Texture::new(Dimension::Cube, faces).unwrap();
+        let second = [1; LANES];
+        let got = one(&texture, &Sampler::default(), &[0.0, -1.0, 0.0], |r| {
+            r.layer = Some(&second);
+        });
+        assert_eq!((got[0], texture.layers()), (9.0, 2));
+    }
+
+    #[test]
+    fn volumes_filter_along_three_axes() {
+        let slices = (0..4)
+            .map(|z| image(4, 4, move |x, _| (x + 10 * z) as f32))
+            .collect();
+        let texture = Texture::new(Dimension::D3, slices).unwrap();
+        let got = one(&texture, &Sampler::default(), &[0.5, 0.375, 0.5], |_| {});
+        assert_eq!(got[..2], [16.5, 1.0]);
+        let got = one(&texture, &nearest(Wrap::Repeat), &[0.6, 0.1, 1.3], |_| {});
+        assert_eq!(got[..2], [12.0, 0.0]);
+        assert_eq!(texture.size(0), [4, 4, 4]);
+    }
+
+    #[test]
+    fn loads_are_clamped() {
+        let texture = ramp(4, 2).with_mip_chain();
+        let load = |x: i32, y: i32, level: i32| {
+            let (x, y, level) = ([x; LANES], [y; LANES], [level; LANES]);
+            let mut out = [[9.0; LANES]; 4];
+            texture.load(&[&x, &y], None, Some(&level), ONE, &mut out);
+            assert_eq!(out[0][1], 9.0, "other lanes are left alone");
+            [out[0][0], out[1][0]]
+        };
+        assert_eq!(load(2, 1, 0), [2.0, 1.0]);
+        assert_eq!(load(-1, 7, 0), [0.0, 1.0]);
+        assert_eq!(load(1, 0, 1), [2.5, 0.5]);
+        assert_eq!(load(i32::MAX, i32::MIN, 99), [1.5, 0.5]);
+    }
+
+    #[test]
+    fn one_dimension_and_clamped_edges() {
+        let texture = ramp(4, 1);
+        assert_eq!(one(&texture, &Sampler::default(), &[0.375], |_| {})[0], 1.0);
+        let at = |u: f32| {
+            one(&texture, &Sampler::default(), &[u, 0.5], |r| {
+                r.detail = Detail::Zero;
+                r.clamp_to_edge = true;
+            })[0]
+        };
+        assert_eq!((at(-1.0), at(1.0), at(0.5)), (0.0, 3.0, 1.5));
+    }
+
+    #[test]
+    fn constant_images_give_their_constant() {
+        let texture = Texture::new(Dimension::D2, vec![image(7, 5, |_, _| 0.1)])
+            .unwrap()
+            .with_mip_chain();
+        // The box filter may round; what a level holds is what a sample of it gives.
+        for i in 0..100 {
+            let (u, v) = (i as f32 * 0.37, i as f32 * 0.73);
+            assert_eq!(one(&texture, &Sampler::default(), &[u, v], |_| {})[0], 0.1);
+        }
+    }
+}
