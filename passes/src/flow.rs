@@ -59,7 +59,7 @@ struct LocalStore {
     every_round: bool,
 }
 
-/// A way out of a loop.
+/// A way out of a loop, or one around its ways out.
 struct Exit {
     loop_: usize,
     conditions: Vec<Value>,
@@ -202,20 +202,6 @@ impl<'a> Flow<'a> {
         self.findings.decides[value.index()]
     }
 
-    /// The numbers of a constant value, one a component, when they are known without overrides.
-    pub(crate) fn numbers(&self, value: Value) -> Option<Vec<f32>> {
-        let count = self.floats(value)?;
-        let mut out = Vec::with_capacity(count);
-        numbers(
-            &self.function.expressions,
-            self.module,
-            value,
-            count,
-            &mut out,
-        )?;
-        (out.len() == count).then_some(out)
-    }
-
     /// The variable that a pointer, image or sampler comes from.
     pub(crate) fn global(&self, mut value: Value) -> Option<Handle<GlobalVariable>> {
         loop {
@@ -256,43 +242,54 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// For each value, whether it reaches an operation with holes in its domain (a division, a
-    /// logarithm, a root) through operations that may hand a bad value on.
-    pub(crate) fn reaches_holes(&self) -> Vec<bool> {
-        let mut reaches = vec![false; self.function.expressions.len()];
+    /// For each value, on which sides it has holes before it: whether a number that is too low or too
+    /// high leads to an operation whose domain ends there (a division, a logarithm, a root), through
+    /// operations that hand it on.
+    pub(crate) fn holes(&self) -> Vec<Holes> {
+        let mut found = vec![Holes::default(); self.function.expressions.len()];
         // A second round takes what a loop stores back to the loads above it.
         for _ in 0..2 {
-            let mut into_local = vec![false; self.function.local_variables.len()];
+            let mut before_local = vec![Holes::default(); self.function.local_variables.len()];
             for (user, expression) in self.function.expressions.iter().rev() {
-                let handed_on = reaches[user.index()];
+                let after = found[user.index()];
                 if let Expression::Load { pointer } = *expression
-                    && handed_on
                     && let Some(local) = self.local(pointer)
                 {
-                    into_local[local.index()] = true;
+                    before_local[local.index()] |= after;
                 }
-                holes(expression, |operand, has_hole| {
-                    if has_hole || (handed_on && self.is_float(operand)) {
-                        reaches[operand.index()] = true;
-                    }
-                });
+                holes(
+                    expression,
+                    |value| self.is_constant(value),
+                    after,
+                    |operand, holes| {
+                        if self.is_float(operand) {
+                            found[operand.index()] |= holes;
+                        }
+                    },
+                );
             }
             for store in &self.findings.stores {
-                if into_local[store.local.index()] {
-                    reaches[store.value.index()] = true;
-                }
+                found[store.value.index()] |= before_local[store.local.index()];
             }
         }
-        reaches
+        found
     }
 
-    /// Whether an operation has a hole in the domain of an operand.
+    /// Whether an operation itself has a hole in the domain of an operand.
     pub(crate) fn has_hole(&self, operation: Value, operand: Value) -> bool {
-        let mut found = false;
-        holes(&self.function.expressions[operation], |value, has_hole| {
-            found |= has_hole && value == operand;
-        });
-        found
+        let mut found = Holes::default();
+        let expression = &self.function.expressions[operation];
+        holes(
+            expression,
+            |_| false,
+            Holes::default(),
+            |value, holes| {
+                if value == operand {
+                    found |= holes;
+                }
+            },
+        );
+        found != Holes::default()
     }
 
     /// For each value, whether anything that differs between fragments is in it: an input, a
@@ -337,74 +334,96 @@ fn local(function: &Function, mut pointer: Value) -> Option<Handle<LocalVariable
     }
 }
 
-/// Appends the numbers of a constant value.
-fn numbers(
-    arena: &naga::Arena<Expression>,
-    module: &Module,
-    value: Value,
-    count: usize,
-    out: &mut Vec<f32>,
-) -> Option<()> {
-    match arena[value] {
-        Expression::Literal(Literal::F32(number)) => out.push(number),
-        Expression::ZeroValue(_) => out.extend(std::iter::repeat_n(0.0, count)),
-        Expression::Constant(constant) => {
-            let init = module.constants[constant].init;
-            numbers(&module.global_expressions, module, init, count, out)?;
-        }
-        Expression::Splat { value, size } => {
-            numbers(arena, module, value, 1, out)?;
-            let number = *out.last()?;
-            out.extend(std::iter::repeat_n(number, size as usize - 1));
-        }
-        Expression::Compose { ref components, .. } => {
-            for &component in components {
-                // A zero vector inside a vector is not resolved: the caller checks the total.
-                numbers(arena, module, component, 1, out)?;
-            }
-        }
-        _ => return None,
-    }
-    Some(())
+/// The sides on which the domain of an operation further on ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Holes {
+    /// A number that is too low falls in.
+    pub(crate) low: bool,
+    /// A number that is too high falls in.
+    pub(crate) high: bool,
 }
 
-/// Tells, for each float operand that an operation may hand a bad value on from, whether the
-/// operation has a hole in that operand's domain.
+impl Holes {
+    const LOW: Self = Self {
+        low: true,
+        high: false,
+    };
+    const BOTH: Self = Self {
+        low: true,
+        high: true,
+    };
+
+    fn flipped(self) -> Self {
+        Self {
+            low: self.high,
+            high: self.low,
+        }
+    }
+
+    /// For an operand whose sign, or whose partner's sign, decides the side.
+    fn either(self) -> Self {
+        let any = self.low || self.high;
+        Self {
+            low: any,
+            high: any,
+        }
+    }
+}
+
+impl std::ops::BitOrAssign for Holes {
+    fn bitor_assign(&mut self, other: Self) {
+        self.low |= other.low;
+        self.high |= other.high;
+    }
+}
+
+/// Tells the holes before each operand of an operation: its own, and those after it (`after`) that a
+/// bad number in the operand would reach.
 ///
-/// Operations whose result lies in a safe range whatever goes in (`abs`, `clamp`, `exp`, a `max` with
-/// a constant) are left out: a bad value ends there.
-fn holes(expression: &Expression, mut visit: impl FnMut(Value, bool)) {
+/// Operations whose result lies in a safe range whatever goes in (`clamp`, `exp`, a `max` with a
+/// constant on its side) end the search: a bad number ends there.
+fn holes(
+    expression: &Expression,
+    is_constant: impl Fn(Value) -> bool,
+    after: Holes,
+    mut visit: impl FnMut(Value, Holes),
+) {
     use naga::BinaryOperator as Op;
     match *expression {
-        Expression::Binary {
-            op: Op::Divide | Op::Modulo,
-            left,
-            right,
-        } => {
-            visit(left, false);
-            visit(right, true);
-        }
-        Expression::Binary {
-            op: Op::Add | Op::Subtract | Op::Multiply,
-            left,
-            right,
-        } => {
-            visit(left, false);
-            visit(right, false);
-        }
-        Expression::Unary { expr, .. }
-        | Expression::Swizzle { vector: expr, .. }
-        | Expression::Splat { value: expr, .. }
-        | Expression::AccessIndex { base: expr, .. }
-        | Expression::Access { base: expr, .. } => visit(expr, false),
+        Expression::Binary { op, left, right } => match op {
+            Op::Divide | Op::Modulo => {
+                visit(left, after.either());
+                // A divisor is kept off 0 from above as a rule.
+                visit(right, Holes::LOW);
+                visit(right, after.either());
+            }
+            Op::Add => [left, right]
+                .into_iter()
+                .for_each(|value| visit(value, after)),
+            Op::Subtract => {
+                visit(left, after);
+                visit(right, after.flipped());
+            }
+            Op::Multiply => {
+                [left, right]
+                    .into_iter()
+                    .for_each(|value| visit(value, after.either()));
+            }
+            _ => {}
+        },
+        Expression::Unary { expr, .. } => visit(expr, after.flipped()),
+        Expression::Swizzle { vector: value, .. }
+        | Expression::Splat { value, .. }
+        | Expression::AccessIndex { base: value, .. }
+        | Expression::Access { base: value, .. } => visit(value, after),
         Expression::Compose { ref components, .. } => {
             components
                 .iter()
-                .for_each(|&component| visit(component, false));
+                .for_each(|&component| visit(component, after));
         }
         Expression::Select { accept, reject, .. } => {
-            visit(accept, false);
-            visit(reject, false);
+            visit(accept, after);
+            visit(reject, after);
         }
         Expression::Math {
             fun,
@@ -412,32 +431,58 @@ fn holes(expression: &Expression, mut visit: impl FnMut(Value, bool)) {
             arg1,
             arg2,
             ..
-        } => match fun {
-            Math::Sqrt
-            | Math::InverseSqrt
-            | Math::Log
-            | Math::Log2
-            | Math::Normalize
-            | Math::Acos
-            | Math::Asin
-            | Math::Acosh
-            | Math::Atanh
-            | Math::Pow => visit(arg, true),
-            Math::Min | Math::Max | Math::Mix | Math::Fma => {
-                visit(arg, false);
-                arg1.into_iter()
-                    .chain(arg2)
-                    .for_each(|arg| visit(arg, false));
+        } => {
+            let others = || arg1.into_iter().chain(arg2);
+            match fun {
+                Math::Log
+                | Math::Log2
+                | Math::Sqrt
+                | Math::InverseSqrt
+                | Math::Pow
+                | Math::Normalize
+                | Math::Acosh => {
+                    let mut holes = after;
+                    holes |= Holes::LOW;
+                    visit(arg, holes);
+                }
+                Math::Acos | Math::Asin | Math::Atanh => visit(arg, Holes::BOTH),
+                Math::Min | Math::Max => {
+                    let limited = is_constant(arg) || others().any(&is_constant);
+                    let rest = match fun {
+                        Math::Max => Holes {
+                            low: after.low && !limited,
+                            ..after
+                        },
+                        _ => Holes {
+                            high: after.high && !limited,
+                            ..after
+                        },
+                    };
+                    visit(arg, rest);
+                    others().for_each(|value| visit(value, rest));
+                }
+                Math::Abs => visit(
+                    arg,
+                    Holes {
+                        low: false,
+                        ..after
+                    }
+                    .either(),
+                ),
+                Math::Floor | Math::Ceil | Math::Round | Math::Trunc => visit(arg, after),
+                Math::Mix
+                | Math::Fma
+                | Math::Dot
+                | Math::Cross
+                | Math::Reflect
+                | Math::Distance
+                | Math::Length => {
+                    visit(arg, after.either());
+                    others().for_each(|value| visit(value, after.either()));
+                }
+                _ => {}
             }
-            Math::Dot | Math::Cross | Math::Reflect | Math::Distance => {
-                visit(arg, false);
-                arg1.into_iter().for_each(|arg| visit(arg, false));
-            }
-            Math::Length | Math::Floor | Math::Ceil | Math::Round | Math::Trunc => {
-                visit(arg, false)
-            }
-            _ => {}
-        },
+        }
         _ => {}
     }
 }
@@ -551,7 +596,12 @@ impl Reader<'_> {
                 }
                 Statement::Continue => {
                     if let Some(&loop_) = self.loops.last() {
+                        // It may pass by the test and the step of a counter.
+                        self.exit(self.loops.len(), branch);
                         self.continued[loop_] = true;
+                        if let Some(exit) = self.exits.last_mut() {
+                            exit.every_round = false;
+                        }
                     }
                 }
                 Statement::Return { value } => {
@@ -735,5 +785,143 @@ impl Reader<'_> {
             } => is_old(left) && is_step(right),
             _ => false,
         }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A shader as it was parsed, its values named as in the source.
+    pub(crate) fn shader(source: &str) -> Shader {
+        let module = naga::front::wgsl::parse_str(source).expect("the test's shader parses");
+        let function = &module.entry_points[0].function;
+        let ids = function.expressions.iter().map(|(value, _)| {
+            match function.named_expressions.get(&value) {
+                Some(name) => ValueId::new(name.as_str(), 0),
+                None => ValueId::new(format!("{}", value.index()), 0),
+            }
+        });
+        let ids = vec![ids.collect()];
+        Shader::new(module, ids)
+    }
+
+    fn decides(source: &str, name: &str) -> Option<Decides> {
+        let shader = shader(source);
+        let (stage, value) = shader.find(&name.into()).expect("the test names a value");
+        Flow::new(&shader, stage).and_then(|flow| flow.decides(value))
+    }
+
+    fn in_loop(before: &str, body: &str) -> String {
+        format!(
+            "@fragment fn main(@location(0) x: f32) -> @location(0) vec4f {{
+                 let slope = x * 0.5; var height = 0.0; var i = 0; var done = false;
+                 {before} {{ {body} }}
+                 return vec4f(height + slope);
+             }}"
+        )
+    }
+
+    #[test]
+    fn a_value_that_a_break_waits_for_stays() {
+        let direct = in_loop("loop", "if height > slope { break; } height += 0.1;");
+        assert_eq!(decides(&direct, "slope"), Some(Decides::Loop));
+        let through_the_variable = in_loop("loop", "height += slope; if height > 1.0 { break; }");
+        assert_eq!(decides(&through_the_variable, "slope"), Some(Decides::Loop));
+        let through_a_flag = in_loop("loop", "if done { break; } if slope > 0.1 { done = true; }");
+        assert_eq!(decides(&through_a_flag, "slope"), Some(Decides::Loop));
+        let by_break_if = in_loop(
+            "loop",
+            "continuing { height += slope; break if height > 1.0; }",
+        );
+        assert_eq!(decides(&by_break_if, "slope"), Some(Decides::Loop));
+        let by_return = in_loop(
+            "loop",
+            "if height > slope { return vec4f(1.0); } height += 0.1;",
+        );
+        assert_eq!(decides(&by_return, "slope"), Some(Decides::Loop));
+    }
+
+    #[test]
+    fn a_counter_that_every_round_tests_and_steps_sets_the_others_free() {
+        let free = |before: &str, body: &str| decides(&in_loop(before, body), "slope").is_none();
+        let late_break = "if height > slope { break; } height += slope;";
+        assert!(free("for (; i < 4; i++)", late_break));
+        assert!(free("for (; i < 4; i += 2)", "height += slope;"));
+        assert!(free(
+            "loop",
+            "if i > 4 { break; } if height > slope { break; } i = 1 + i;"
+        ));
+        // A `continue` before the test, or around the step, and the counter counts for nothing.
+        assert!(!free(
+            "loop",
+            "if slope > 0.5 { continue; } if i > 4 { break; } i++;"
+        ));
+        assert!(!free("loop", "if i > 4 { break; } if slope > 0.5 { i++; }"));
+        // A step back, or by a float, is none; nor is a test in a branch.
+        assert!(!free("for (; i < 4; i++)", "if slope > 0.5 { i = 0; }"));
+        assert!(!free("loop", "if i > 4 { break; } i += i32(slope);"));
+        assert!(!free("loop", "if slope > 0.5 { if i > 4 { break; } } i++;"));
+    }
+
+    #[test]
+    fn a_break_out_of_a_switch_is_no_way_out_of_the_loop() {
+        let body = "if i > 4 { break; } switch i { case 1: { if slope > 0.5 { break; } height += 1.0; } default: {} } i++;";
+        assert_eq!(decides(&in_loop("loop", body), "slope"), None);
+    }
+
+    #[test]
+    fn only_the_built_in_part_of_an_output_stays() {
+        let source = "struct Out { @location(0) c: vec4f, @builtin(frag_depth) d: f32 }
+            @fragment fn main(@location(0) x: f32) -> Out {
+                let tone = x * x; let depth = x + 0.5; return Out(vec4f(tone), depth);
+            }";
+        assert_eq!(decides(source, "tone"), None);
+        assert_eq!(decides(source, "depth"), Some(Decides::BuiltIn));
+    }
+
+    #[test]
+    fn what_is_written_to_memory_stays_with_the_branch_around_it() {
+        let source = "@group(0) @binding(0) var<storage, read_write> log: f32;
+            @fragment fn main(@location(0) x: f32) -> @location(0) vec4f {
+                let heat = x * x; let when = x + 0.5; let tone = x * 2.0;
+                if when > 1.0 { log = heat; }
+                return vec4f(tone);
+            }";
+        assert_eq!(decides(source, "heat"), Some(Decides::Memory));
+        assert_eq!(decides(source, "when"), Some(Decides::Memory));
+        assert_eq!(decides(source, "tone"), None);
+    }
+
+    #[test]
+    fn holes_are_reached_through_sums_and_variables_but_not_through_guards() {
+        let source = "@fragment fn main(@location(0) x: f32) -> @location(0) vec4f {
+                let far = x + 2.0; let guarded = x + 3.0; let stored = x + 4.0; let over = x + 5.0;
+                let under = x + 6.0;
+                var kept = 0.0;
+                if x > 0.5 { kept = stored; }
+                let root = sqrt(far + 1.0) + log(max(guarded, 0.1)) + over / (kept + 1.0)
+                    + sqrt(1.0 - max(under, 0.0));
+                return vec4f(root);
+            }";
+        let shader = shader(source);
+        let flow = Flow::new(&shader, Stage::Fragment).expect("there is a fragment stage");
+        let holes = flow.holes();
+        for (name, expected) in [
+            ("far", true),
+            ("guarded", false),
+            ("stored", true),
+            ("over", false),
+        ] {
+            let (_, value) = shader.find(&name.into()).expect("the test names a value");
+            assert_eq!(holes[value.index()].low, expected, "{name}");
+        }
+        let (_, under) = shader
+            .find(&"under".into())
+            .expect("the test names a value");
+        assert!(
+            holes[under.index()].high,
+            "what is taken off may be too high"
+        );
     }
 }

@@ -6,6 +6,7 @@
 //! This crate reads no files, starts no threads and knows no GPU.
 
 pub mod autolod;
+mod constants;
 pub mod cost;
 pub mod edit;
 pub mod facts;

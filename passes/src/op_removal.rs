@@ -18,7 +18,8 @@
 //! - What decides when a loop ends (unless a counter of integers ends it anyway), a built-in output
 //!   such as the depth, or what is written to memory. The condition of a `discard` may change: the
 //!   picture shows it.
-//! - A texture coordinate that would become the same for every fragment: that is texture-removal.
+//! - What would have a texture read at the same coordinate by every fragment: that is texture-removal,
+//!   done the slow way.
 //! - A guard, that is `max`, `min`, `clamp`, `saturate` or `abs` on the way to a division, root,
 //!   logarithm, power or `normalize`, and a constant added right before one, unless the samples stay
 //!   away from its limit by [`MARGIN`] of the range seen and of the limit, below by the limit itself.
@@ -35,13 +36,14 @@
 
 use crate::cost::{SAMPLE_WEIGHT, SPECIAL_WEIGHT};
 use crate::edit::{Edit, New};
-use crate::flow::{Flow, Value};
+use crate::flow::{Flow, Holes, Value};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
-use crate::{Facts, operands};
+use crate::{Facts, constants, operands};
 use naga::{
     BinaryOperator as Op, Binding, Expression, MathFunction as Math, TypeInner, UnaryOperator,
 };
+use std::collections::BTreeSet;
 
 /// The stages whose operations are removed. The other passes' errors are those of fragments too.
 const STAGES: [Stage; 1] = [Stage::Fragment];
@@ -147,7 +149,9 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<(Value, Ne
             let count = mean_components(&flow, site).ok_or_else(|| {
                 Declined("it is no operation, merged variable or input of f32".into())
             })?;
-            vec![(site, New::Numbers(candidate.baked(count)?))]
+            let numbers = candidate.baked(count)?;
+            constants::follow(&flow, &[(site, &numbers)])?;
+            vec![(site, New::Numbers(numbers))]
         }
         Choice::Without => without(&flow, site)?,
     };
@@ -192,8 +196,13 @@ fn mean_components(flow: &Flow, site: Value) -> Option<usize> {
         | Expression::Select { .. }
         | Expression::Math { .. }
         | Expression::Derivative { .. }
-        | Expression::Compose { .. }
         | Expression::As { .. } => true,
+        // Made of one part, it says the same as the part, less plainly.
+        Expression::Compose { ref components, .. } => {
+            let mut parts = components.iter().filter(|part| !flow.is_constant(**part));
+            let first = parts.next();
+            parts.any(|part| Some(part) != first)
+        }
         Expression::Load { pointer } => flow.local(pointer).is_some(),
         _ => matches!(flow.input(site), Some(Binding::Location { .. })),
     };
@@ -341,44 +350,19 @@ fn lost_limits(flow: &Flow, site: Value, kept: Value, direct: bool) -> Limits {
 struct Survey<'a> {
     flow: &'a Flow<'a>,
     facts: &'a Facts,
-    /// For each value, whether a bad number in it can reach an operation with holes.
-    reaches_holes: Vec<bool>,
+    /// For each value, on which sides there are holes before it.
+    holes: Vec<Holes>,
+    /// For each value, whether it differs between fragments.
     varying: Vec<bool>,
-    /// For each value, whether it is a texture coordinate, or a part of one as it stands.
-    coordinate: Vec<bool>,
 }
 
 impl<'a> Survey<'a> {
     fn new(flow: &'a Flow<'a>, facts: &'a Facts) -> Self {
-        let mut coordinate = vec![false; flow.function.expressions.len()];
-        for (value, expression) in flow.function.expressions.iter().rev() {
-            match *expression {
-                Expression::ImageSample {
-                    coordinate: place, ..
-                }
-                | Expression::ImageLoad {
-                    coordinate: place, ..
-                } => {
-                    coordinate[place.index()] = true;
-                }
-                Expression::Swizzle { .. }
-                | Expression::AccessIndex { .. }
-                | Expression::Compose { .. }
-                | Expression::Splat { .. }
-                | Expression::As { .. }
-                    if coordinate[value.index()] =>
-                {
-                    operands::each(expression, |part| coordinate[part.index()] = true);
-                }
-                _ => {}
-            }
-        }
         Self {
             flow,
             facts,
-            reaches_holes: flow.reaches_holes(),
+            holes: flow.holes(),
             varying: flow.varying(),
-            coordinate,
         }
     }
 
@@ -432,19 +416,18 @@ impl<'a> Survey<'a> {
 
     fn keep(&self, site: Value, kept: Value) -> Result<(), Declined> {
         may_change(self.flow, site)?;
-        if self.coordinate[site.index()] && !self.varying[kept.index()] {
+        if !self.varying[kept.index()] && self.stills_a_read(site) {
             return Err(Declined("a texture would be read at one place only".into()));
         }
-        if !self.reaches_holes[site.index()] {
+        let holes = self.holes[site.index()];
+        if holes == Holes::default() {
             return Ok(());
         }
         let limits = lost_limits(self.flow, site, kept, self.is_before_hole(site));
-        let holds = |limit: &Option<Limit>, above: bool| {
-            limit
-                .as_ref()
-                .is_none_or(|limit| self.stays_away(kept, limit, above))
+        let holds = |hole: bool, limit: Option<Limit>, above: bool| {
+            !hole || limit.is_none_or(|limit| self.stays_away(kept, &limit, above))
         };
-        if holds(&limits.low, true) && holds(&limits.high, false) {
+        if holds(holes.low, limits.low, true) && holds(holes.high, limits.high, false) {
             Ok(())
         } else {
             Err(Declined(
@@ -455,10 +438,11 @@ impl<'a> Survey<'a> {
 
     fn mean(&self, site: Value, count: usize) -> Result<Vec<u32>, Declined> {
         may_change(self.flow, site)?;
-        if self.coordinate[site.index()] {
+        if self.stills_a_read(site) {
             return Err(Declined("a texture would be read at one place only".into()));
         }
         let mean = self.facts.mean(self.flow.id(site), count)?;
+        constants::follow(self.flow, &[(site, mean)])?;
         Ok(mean.iter().map(|number| number.to_bits()).collect())
     }
 
@@ -469,6 +453,34 @@ impl<'a> Survey<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Whether a texture would be read at the same coordinate by every fragment if a value were the
+    /// same for all.
+    fn stills_a_read(&self, site: Value) -> bool {
+        let mut still = BTreeSet::from([site]);
+        let mut next = BTreeSet::from_iter(self.flow.users(site));
+        // Operands come before users, so that each value is settled when it is met.
+        while let Some(value) = next.pop_first() {
+            let expression = &self.flow.function.expressions[value];
+            if let Expression::ImageSample { coordinate, .. }
+            | Expression::ImageLoad { coordinate, .. } = *expression
+            {
+                if still.contains(&coordinate) {
+                    return true;
+                }
+                continue;
+            }
+            let mut all = true;
+            operands::each(expression, |operand| {
+                all &= !self.varying[operand.index()] || still.contains(&operand);
+            });
+            if all {
+                still.insert(value);
+                next.extend(self.flow.users(value));
+            }
+        }
+        false
     }
 
     /// Whether an operation with a hole uses a value as it stands, or a part of it.
@@ -501,7 +513,7 @@ impl<'a> Survey<'a> {
         let known;
         let limits: &[f32] = match *limit {
             Limit::Number(number) => &[number],
-            Limit::Value(limit) => match self.flow.numbers(limit) {
+            Limit::Value(limit) => match constants::numbers(self.flow, limit) {
                 Some(numbers) => {
                     known = numbers;
                     &known

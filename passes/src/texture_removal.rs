@@ -27,11 +27,11 @@
 //! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail",
 //! 2003, section 2.1.
 
-use crate::Facts;
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
+use crate::{Facts, constants};
 use naga::{Expression, GlobalVariable, Handle};
 
 /// The stage whose reads are removed: textures that move vertices belong to the mesh.
@@ -124,8 +124,12 @@ impl Pass for TextureRemoval {
                 survey.list(site, flow.global(image), &[site], &mut found);
             }
         }
+        let mut listed = Vec::new();
         for (site, expression) in flow.function.expressions.iter() {
-            if let Expression::GlobalVariable(texture) = *expression {
+            if let Expression::GlobalVariable(texture) = *expression
+                && !listed.contains(&texture)
+            {
+                listed.push(texture);
                 let reads = reads(&flow, texture);
                 if reads.len() > 1 {
                     survey.list(site, Some(texture), &reads, &mut found);
@@ -172,8 +176,15 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Vec<Value>, Vec<f32>)
             ));
         }
     };
-    let count = removable(&flow, &reads, choice)?;
-    Ok((reads, candidate.baked(count)?))
+    let numbers = candidate.baked(removable(&flow, &reads, choice)?)?;
+    follow(&flow, &reads, &numbers)?;
+    Ok((reads, numbers))
+}
+
+/// Declines a constant that an operation on the reads cannot take.
+fn follow(flow: &Flow, reads: &[Value], numbers: &[f32]) -> Result<(), Declined> {
+    let become_constant: Vec<_> = reads.iter().map(|read| (*read, numbers)).collect();
+    constants::follow(flow, &become_constant)
 }
 
 /// The texture that a value is read from, when it is a texture read.
@@ -274,10 +285,12 @@ impl Survey<'_> {
                 let known = known.ok_or_else(|| {
                     Declined("its texture has no image, so it may hold anything".into())
                 })?;
-                match choice {
-                    Choice::SeenMean => self.seen_mean(reads, count),
-                    _ => known.mean_at_level().map(|mean| mean[..count].to_vec()),
-                }
+                let mean = match choice {
+                    Choice::SeenMean => self.seen_mean(reads, count)?,
+                    _ => known.mean_at_level()?[..count].to_vec(),
+                };
+                follow(self.flow, reads, &mean)?;
+                Ok(mean)
             });
             let (value, declined) = match verdict {
                 Ok(mean) => (mean.iter().map(|number| number.to_bits()).collect(), None),
