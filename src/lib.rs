@@ -4,6 +4,7 @@
 //! chosen by one `autoLOD` value, each with its measured error.
 
 pub mod diagnostic;
+pub mod emit;
 pub mod front;
 
 pub use diagnostic::{Diagnostic, Result};

@@ -1,0 +1,243 @@
+//! Emission: the author's shader and its levels become files.
+//!
+//! ```text
+//! text + module + [EmitLevel] --splice--> one WGSL text that chooses by autoLOD
+//!                             --files---> one WGSL text a level
+//! WGSL text --targets--> SPIR-V, GLSL, HLSL, MSL
+//! base + Lock --replay--> [EmitLevel]
+//! ```
+//!
+//! The author's text stays as it is; level 0 is that text. Everything here is a function of its arguments,
+//! and [`write_atomically`] is the only thing that touches the disk.
+
+mod lines;
+mod names;
+mod print;
+mod source;
+mod splice;
+mod targets;
+mod tidy;
+mod tokens;
+mod write;
+
+pub use write::write_atomically;
+
+use crate::{Diagnostic, Result};
+use lodc_passes::Shader;
+use naga::Module;
+use naga::valid::ModuleInfo;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// How a level is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// By a pipeline constant. Asks nothing of the host; WGSL alone carries it.
+    #[default]
+    Override,
+    /// By a uniform buffer, which costs a binding.
+    Uniform,
+    /// By the host, which loads one file a level.
+    Files,
+}
+
+/// The language that is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Target {
+    /// WGSL.
+    #[default]
+    Wgsl,
+    /// SPIR-V 1.0, coordinates as in the source.
+    Spirv,
+    /// GLSL 4.50, a file a stage.
+    Glsl,
+    /// HLSL, shader model 6.0.
+    Hlsl,
+    /// The Metal shading language, 2.0.
+    Msl,
+}
+
+impl Target {
+    /// Its name on the command line and in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wgsl => "wgsl",
+            Self::Spirv => "spirv",
+            Self::Glsl => "glsl",
+            Self::Hlsl => "hlsl",
+            Self::Msl => "msl",
+        }
+    }
+}
+
+/// What is emitted: the form, and the language.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// How a level is chosen.
+    pub form: Form,
+    /// The language.
+    pub target: Target,
+}
+
+/// The author's shader.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// The file, as the user named it.
+    pub name: &'a str,
+    /// Its text.
+    pub text: &'a str,
+    /// The valid module that the text was parsed to, not normalised.
+    pub module: &'a Module,
+    /// The fragment entry point that has levels.
+    pub fragment: &'a str,
+    /// The vertex entry point that goes with it.
+    pub vertex: Option<&'a str>,
+}
+
+impl Source<'_> {
+    /// The file's name without folders, `brick.wgsl`.
+    pub fn file_name(&self) -> String {
+        Path::new(self.name).file_name().map_or_else(
+            || self.name.to_owned(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+
+    /// The file's name without folders and extension, `brick`.
+    pub fn stem(&self) -> String {
+        Path::new(self.name).file_stem().map_or_else(
+            || self.name.to_owned(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+}
+
+/// A level below the original: a variant, and from where it is used. The figures are for people.
+#[derive(Clone, Debug)]
+pub struct EmitLevel {
+    /// The autoLOD from which it is used: above 0, and above that of the level before.
+    pub autolod: f32,
+    /// The variant, in normal form.
+    pub shader: Shader,
+    /// The distance from the eye to the object's centre, in world units, at which `autolod` is reached.
+    pub distance: f64,
+    /// Root mean square error, of display values in 0..1.
+    pub error: f64,
+    /// Cost, as a share of the original's.
+    pub cost: f64,
+    /// What changed, for people: lower case, without a full stop.
+    pub says: String,
+}
+
+/// Emits a shader with its levels. The files come back as names, to be put beside the source, and contents.
+///
+/// # Errors
+/// When the form cannot be carried by the target, the thresholds do not rise, the source declares an `autoLOD`
+/// that cannot be used, or a writer has no form for something in the shader.
+pub fn emit(
+    source: &Source<'_>,
+    levels: &[EmitLevel],
+    output: Output,
+) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+    check_thresholds(levels)?;
+    let stem = source.stem();
+    match output.form {
+        Form::Override | Form::Uniform => {
+            let spliced = splice::splice(source, levels, output.form)?;
+            if output.target == Target::Wgsl {
+                parse(&spliced.text, source)?;
+                return Ok(vec![(
+                    format!("{stem}.lod.wgsl").into(),
+                    spliced.text.into_bytes(),
+                )]);
+            }
+            if spliced.by_override {
+                return Err(no_override(output.target));
+            }
+            let (module, info) = parse(&spliced.text, source)?;
+            targets::write(
+                source,
+                &module,
+                &info,
+                output.target,
+                &format!("{stem}.lod"),
+            )
+        }
+        Form::Files => {
+            let mut files = Vec::new();
+            for level in 0..=levels.len() {
+                let stem = format!("{stem}.lod{level}");
+                let text = match level.checked_sub(1) {
+                    None => source.text.to_owned(),
+                    Some(at) => splice::alone(source, level, &levels[at])?,
+                };
+                let (module, info) = parse(text.strip_prefix('\u{feff}').unwrap_or(&text), source)?;
+                if output.target == Target::Wgsl {
+                    files.push((format!("{stem}.wgsl").into(), text.into_bytes()));
+                } else {
+                    files.extend(targets::write(
+                        source,
+                        &module,
+                        &info,
+                        output.target,
+                        &stem,
+                    )?);
+                }
+            }
+            Ok(files)
+        }
+    }
+}
+
+/// Thresholds rise from above 0, so that no level hides another and NaN chooses the original.
+fn check_thresholds(levels: &[EmitLevel]) -> Result<()> {
+    let mut before = 0.0;
+    for (at, level) in levels.iter().enumerate() {
+        if !(level.autolod > before && level.autolod.is_finite()) {
+            return Err(Diagnostic::error(format!(
+                "level {} starts at autoLOD {}, which is not above {before}",
+                at + 1,
+                level.autolod
+            ))
+            .with_note("thresholds rise from level to level, and the first is above 0"));
+        }
+        before = level.autolod;
+    }
+    Ok(())
+}
+
+fn no_override(target: Target) -> Box<Diagnostic> {
+    Diagnostic::error(format!(
+        "the override form cannot be written as {}: only WGSL has pipeline constants that lodc can write",
+        target.name()
+    ))
+    .with_note("`--form uniform` chooses a level by a uniform buffer, `--form files` writes one file a level")
+}
+
+/// Parses and validates an emitted text. What fails here is a flaw of lodc's.
+fn parse(text: &str, source: &Source<'_>) -> Result<(Module, ModuleInfo)> {
+    let flaw = |message: String, labels: Vec<(std::ops::Range<usize>, String)>| {
+        let mut flaw = Diagnostic::error(format!(
+            "internal error: the emitted shader is not valid: {message}"
+        ))
+        .with_source(format!("{} (as emitted)", source.file_name()), text)
+        .with_note(format!(
+            "this is a flaw of lodc: please report it with {} and its lock; nothing was written",
+            source.file_name()
+        ));
+        flaw.labels = labels;
+        flaw
+    };
+    let module = naga::front::wgsl::parse_str(text).map_err(|error| {
+        let labels = error
+            .labels()
+            .filter_map(|(span, remark)| Some((span.to_range()?, remark.to_owned())))
+            .collect();
+        flaw(error.message().to_owned(), labels)
+    })?;
+    let info = print::validate(&module).map_err(|message| flaw(message, Vec::new()))?;
+    Ok((module, info))
+}

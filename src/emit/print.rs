@@ -1,0 +1,401 @@
+//! Writes a naga module as WGSL under its own names.
+//!
+//! naga's writer renames what ends in a digit, repeats, or has two underscores. So everything that has a name
+//! is given a placeholder of letters alone, the writer writes those, and the intended names are put back word
+//! by word. Values that the writer numbers (`_e17`) get readable names on the way.
+
+use super::lines;
+use super::names::{Names, letters};
+use super::source::{Keyword, Text};
+use super::tidy::{Style, tidy, with_short_types};
+use super::tokens::{Kind, tokens};
+use lodc_passes::shader::Stage;
+use naga::back::wgsl::WriterFlags;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{Expression, Function, Handle, Module, Type, TypeInner};
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// A declaration of a written module.
+#[derive(Clone, Debug)]
+pub(crate) struct Item {
+    pub(crate) keyword: Keyword,
+    pub(crate) name: String,
+    /// Its text, ending in a line end.
+    pub(crate) text: String,
+    /// The words that mean something predeclared.
+    pub(crate) predeclared: BTreeSet<String>,
+    /// The declarations of the same module that it names.
+    pub(crate) uses: BTreeSet<String>,
+}
+
+/// A written module.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Printed {
+    /// `enable` directives that it needs.
+    pub(crate) directives: Vec<String>,
+    /// Its declarations, in the writer's order.
+    pub(crate) items: Vec<Item>,
+}
+
+/// A function of a module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Owner {
+    Function(Handle<Function>),
+    EntryPoint(usize),
+}
+
+/// How things are to be called.
+pub(crate) struct Wishes<'a> {
+    /// Names at module scope that stay as they are.
+    pub(crate) keep: &'a dyn Fn(&str) -> bool,
+    /// Names that nothing else at module scope may take.
+    pub(crate) taken: &'a Names,
+    /// Names at module scope outside of the module: what is local may not hide them.
+    pub(crate) outside: &'a Names,
+    /// A name for a value that has none of its own.
+    pub(crate) value: &'a dyn Fn(Owner, Handle<Expression>) -> Option<String>,
+    /// Whether types are written `vec3f`.
+    pub(crate) short_types: bool,
+}
+
+/// Writes a module.
+///
+/// # Errors
+/// What naga's validator or writer says, as one line; the module has a flaw then, or uses what WGSL has not.
+pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, String> {
+    let mut module = module.clone();
+    let mut labels = Labels::default();
+    let mut taken = wishes.taken.clone();
+    let mut locals = wishes.outside.clone();
+    let mut global = |name: Option<&str>, fallback: &str| -> String {
+        let name = match name {
+            Some(name) if (wishes.keep)(name) => name.to_owned(),
+            name => taken.take(name.unwrap_or(fallback)),
+        };
+        taken.reserve([name.as_str()]);
+        locals.reserve([name.as_str()]);
+        name
+    };
+
+    label_types(&mut module, &mut labels, &mut global);
+    for (_, variable) in module.global_variables.iter_mut() {
+        variable.name = Some(labels.add(global(variable.name.as_deref(), "binding")));
+    }
+    for (_, constant) in module.constants.iter_mut() {
+        if let Some(name) = &mut constant.name {
+            *name = labels.add(global(Some(name), "constant"));
+        }
+    }
+    for (_, constant) in module.overrides.iter_mut() {
+        constant.name = Some(labels.add(global(constant.name.as_deref(), "setting")));
+    }
+    for (_, function) in module.functions.iter_mut() {
+        function.name = Some(labels.add(global(function.name.as_deref(), "function")));
+    }
+    for entry in &mut module.entry_points {
+        entry.name = labels.add(global(Some(&entry.name), "entry"));
+    }
+
+    let info = validate(&module)?;
+    let mut scopes = Vec::new();
+    let mut owners = BTreeMap::new();
+    let handles: Vec<_> = module.functions.iter().map(|(handle, _)| handle).collect();
+    let all = (handles.into_iter().map(Owner::Function))
+        .chain((0..module.entry_points.len()).map(Owner::EntryPoint));
+    for owner in all {
+        let plan = match owner {
+            Owner::Function(handle) => {
+                lines::plan(&module, &module.functions[handle], &info[handle])
+            }
+            Owner::EntryPoint(i) => lines::plan(
+                &module,
+                &module.entry_points[i].function,
+                info.get_entry_point(i),
+            ),
+        };
+        let (function, label) = match owner {
+            Owner::Function(handle) => {
+                let function = module.functions.get_mut(handle);
+                let label = function.name.clone().unwrap_or_default();
+                (function, label)
+            }
+            Owner::EntryPoint(i) => {
+                let entry = &mut module.entry_points[i];
+                (&mut entry.function, entry.name.clone())
+            }
+        };
+        owners.insert(label, scopes.len());
+        scopes.push(Scope::new(owner, function, plan, &locals, &mut labels));
+    }
+    // naga's writer panics on what WGSL has no form for, such as ray queries.
+    let written = catch_unwind(AssertUnwindSafe(|| {
+        naga::back::wgsl::write_string(&module, &info, WriterFlags::empty())
+    }))
+    .map_err(|_| "naga's writer has no WGSL for something in it".to_owned())?
+    .map_err(|e| e.to_string())?;
+
+    let text = Text::new(&written);
+    let mut printed = Printed {
+        directives: text.directives.iter().map(|d| (*d).to_owned()).collect(),
+        items: Vec::new(),
+    };
+    for declaration in &text.declarations {
+        let raw = &written[declaration.span.clone()];
+        let scope = owners
+            .get(&declaration.name)
+            .and_then(|at| scopes.get_mut(*at));
+        let tidied = match &scope {
+            Some(scope) => scope.tidied(raw, wishes.short_types),
+            None if wishes.short_types => with_short_types(raw),
+            None => raw.to_owned(),
+        };
+        let mut item = labels.put_back(&tidied, scope, wishes);
+        item.keyword = declaration.keyword;
+        item.name = labels
+            .names
+            .get(&declaration.name)
+            .unwrap_or(&declaration.name)
+            .clone();
+        printed.items.push(item);
+    }
+    Ok(printed)
+}
+
+/// Gives structs and their members placeholders. Predeclared ones keep their members' names.
+fn label_types(
+    module: &mut Module,
+    labels: &mut Labels,
+    global: &mut dyn FnMut(Option<&str>, &str) -> String,
+) {
+    let special = &module.special_types;
+    let predeclared: BTreeSet<Handle<Type>> = special
+        .predeclared_types
+        .values()
+        .copied()
+        .chain(special.external_texture_params)
+        .chain(special.external_texture_transfer_function)
+        .collect();
+    let handles: Vec<_> = module.types.iter().map(|(handle, _)| handle).collect();
+    for handle in handles {
+        let mut ty = module.types[handle].clone();
+        let TypeInner::Struct { members, .. } = &mut ty.inner else {
+            continue;
+        };
+        if predeclared.contains(&handle) {
+            continue;
+        }
+        ty.name = Some(labels.add(global(ty.name.as_deref(), "Block")));
+        let mut used = Names::default();
+        for member in members {
+            let name = member.name.as_deref().unwrap_or("member");
+            let name = used.take_member(name);
+            member.name = Some(labels.add(name));
+        }
+        module.types.replace(handle, ty);
+    }
+}
+
+/// Validates a module with everything allowed that naga knows.
+pub(crate) fn validate(module: &Module) -> Result<ModuleInfo, String> {
+    Validator::new(ValidationFlags::all(), Capabilities::all())
+        .validate(module)
+        .map_err(|error| {
+            let mut text = error.as_inner().to_string();
+            let mut source = std::error::Error::source(error.as_inner());
+            while let Some(inner) = source {
+                text = format!("{text}: {inner}");
+                source = inner.source();
+            }
+            text
+        })
+}
+
+/// Placeholders and the names that they stand for.
+#[derive(Default)]
+struct Labels {
+    names: BTreeMap<String, String>,
+}
+
+impl Labels {
+    fn add(&mut self, name: String) -> String {
+        let label = format!("lodq{}q", letters(self.names.len()));
+        self.names.insert(label.clone(), name);
+        label
+    }
+
+    /// The text with names in the place of placeholders and numbers.
+    fn put_back(&self, text: &str, mut scope: Option<&mut Scope>, wishes: &Wishes<'_>) -> Item {
+        let mut out = String::with_capacity(text.len());
+        let mut uses = BTreeSet::new();
+        let mut predeclared = BTreeSet::new();
+        let mut after_point = false;
+        for token in tokens(text) {
+            let word = &text[token.span];
+            if token.kind != Kind::Word {
+                after_point = word == ".";
+                out.push_str(word);
+                continue;
+            }
+            let local = scope.as_mut().and_then(|scope| scope.name(word, wishes));
+            match (local, self.names.get(word)) {
+                (Some(name), _) => out.push_str(&name),
+                (None, Some(name)) => {
+                    if !after_point {
+                        uses.insert(name.clone());
+                    }
+                    out.push_str(name);
+                }
+                (None, None) => {
+                    if !after_point {
+                        predeclared.insert(word.to_owned());
+                    }
+                    out.push_str(word);
+                }
+            }
+            after_point = false;
+        }
+        // The writer leaves a blank behind attributes.
+        let mut text = out.replace(" \n", "\n");
+        if !text.ends_with('\n') {
+            text.push('\n');
+        }
+        if let Some(variable) = text.find("\nvar") {
+            text.replace_range(variable..=variable, " ");
+        }
+        Item {
+            keyword: Keyword::Fn,
+            name: String::new(),
+            text,
+            predeclared,
+            uses,
+        }
+    }
+}
+
+/// The names within a function.
+struct Scope {
+    owner: Owner,
+    taken: Names,
+    /// Placeholders and numbered values that have their names.
+    given: BTreeMap<String, String>,
+    /// Placeholders of values.
+    values: BTreeMap<String, (Handle<Expression>, Option<String>)>,
+    expressions: BTreeMap<usize, Handle<Expression>>,
+    style: Style,
+}
+
+impl Scope {
+    fn new(
+        owner: Owner,
+        function: &mut Function,
+        plan: lines::Lines,
+        taken: &Names,
+        labels: &mut Labels,
+    ) -> Self {
+        let mut scope = Self {
+            owner,
+            taken: taken.clone(),
+            given: BTreeMap::new(),
+            values: BTreeMap::new(),
+            expressions: function
+                .expressions
+                .iter()
+                .map(|(handle, _)| (handle.index(), handle))
+                .collect(),
+            style: Style {
+                inline: plan
+                    .inline
+                    .iter()
+                    .map(|handle| format!("_e{}", handle.index()))
+                    .collect(),
+                short_types: false,
+                bare_numbers: plan.bare_numbers,
+            },
+        };
+        for argument in &mut function.arguments {
+            let name = scope
+                .taken
+                .take(argument.name.as_deref().unwrap_or("input"));
+            let label = labels.add(name.clone());
+            scope.given.insert(label.clone(), name);
+            argument.name = Some(label);
+        }
+        for (_, local) in function.local_variables.iter_mut() {
+            let name = scope.taken.take(local.name.as_deref().unwrap_or("local"));
+            let label = labels.add(name.clone());
+            scope.given.insert(label.clone(), name);
+            local.name = Some(label);
+        }
+        let own_names = std::mem::take(&mut function.named_expressions);
+        for value in plan.named {
+            let label = labels.add(String::new());
+            scope
+                .values
+                .insert(label.clone(), (value, own_names.get(&value).cloned()));
+            function.named_expressions.insert(value, label);
+        }
+        scope
+    }
+
+    /// The function's text without clutter.
+    fn tidied(&self, raw: &str, short_types: bool) -> String {
+        let style = Style {
+            short_types,
+            ..self.style.clone()
+        };
+        let start = if raw.starts_with("fn ") {
+            0
+        } else {
+            raw.find("\nfn ").map_or(0, |at| at + 1)
+        };
+        match tidy(&raw[start..], &style) {
+            Some(text) => format!("{}{text}", &raw[..start]),
+            None => raw.to_owned(),
+        }
+    }
+
+    /// The name that a word of the function's text stands for, when it is one of the function's own.
+    fn name(&mut self, word: &str, wishes: &Wishes<'_>) -> Option<String> {
+        if let Some(name) = self.given.get(word) {
+            return Some(name.clone());
+        }
+        let (value, own) = match self.values.get(word) {
+            Some((value, own)) => (*value, own.clone()),
+            None => {
+                let index = word.strip_prefix("_e")?.parse::<usize>().ok()?;
+                (*self.expressions.get(&index)?, None)
+            }
+        };
+        let wish = own
+            .or_else(|| (wishes.value)(self.owner, value))
+            .unwrap_or_else(|| "value".to_owned());
+        let name = self.taken.take(&wish);
+        self.given.insert(word.to_owned(), name.clone());
+        Some(name)
+    }
+}
+
+/// A short name for a value from the path of its id: without the function's name, and without what is far
+/// from the value when the path is long.
+pub(crate) fn short_name(path: &str, entry_point: &str) -> String {
+    const LONG: usize = 32;
+    let mut parts: Vec<&str> = path.split('.').collect();
+    if parts.len() > 1 && parts[0] == entry_point {
+        parts.remove(0);
+    }
+    while parts.len() > 2 && parts.iter().map(|part| part.len() + 1).sum::<usize>() > LONG {
+        parts.remove(0);
+    }
+    parts.join("_")
+}
+
+/// Wishes for the values of a shader in normal form.
+pub(crate) fn value_name(
+    shader: &lodc_passes::Shader,
+    stage: Stage,
+    value: Handle<Expression>,
+) -> Option<String> {
+    let entry = shader.entry_point(stage)?;
+    Some(short_name(shader.id(stage, value).path(), &entry.name))
+}

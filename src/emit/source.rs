@@ -1,0 +1,418 @@
+//! The author's WGSL text: its declarations, its entry points, and the edits that turn one of them
+//! into an ordinary function. Everything else of the text stays as it is, byte for byte.
+
+use super::tokens::{Kind, Token, tokens, words};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// The keyword that a module-scope declaration starts with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Keyword {
+    Fn,
+    Struct,
+    Const,
+    Override,
+    Var,
+    Alias,
+}
+
+/// A declaration at module scope.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Declaration {
+    pub(crate) keyword: Keyword,
+    pub(crate) name: String,
+    /// The bytes of the name.
+    pub(crate) name_span: Range<usize>,
+    /// From the first attribute to the closing `;` or `}`.
+    pub(crate) span: Range<usize>,
+    /// The same as a range of [`Text::tokens`].
+    tokens: Range<usize>,
+}
+
+/// A WGSL text and what is known of it without parsing expressions.
+#[derive(Clone, Debug)]
+pub(crate) struct Text<'a> {
+    /// The text, without a byte-order mark.
+    pub(crate) text: &'a str,
+    /// Every token that is neither blank nor comment.
+    tokens: Vec<Token>,
+    /// Every identifier and keyword in it, at any scope.
+    pub(crate) words: BTreeSet<&'a str>,
+    /// What it declares at module scope, in order.
+    pub(crate) declarations: Vec<Declaration>,
+    /// `enable`, `requires` and `diagnostic` directives, each with its semicolon.
+    pub(crate) directives: Vec<&'a str>,
+    /// Its line end.
+    pub(crate) line_end: &'static str,
+}
+
+/// A function's signature, by span.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Signature {
+    /// From the first attribute to before the body, without trailing comments and blanks.
+    pub(crate) span: Range<usize>,
+    /// The name.
+    pub(crate) name: Range<usize>,
+    /// The names of the parameters.
+    pub(crate) parameters: Vec<Range<usize>>,
+    /// Whether it returns a value.
+    pub(crate) returns: bool,
+    /// Each attribute, as the spans of its tokens.
+    attributes: Vec<Vec<Range<usize>>>,
+}
+
+impl<'a> Text<'a> {
+    /// Reads a text that naga has accepted.
+    pub(crate) fn new(text: &'a str) -> Self {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut read = Self {
+            text,
+            tokens: tokens(text)
+                .into_iter()
+                .filter(Token::is_significant)
+                .collect(),
+            words: words(text),
+            declarations: Vec::new(),
+            directives: Vec::new(),
+            line_end: match text.find('\n') {
+                Some(at) if text[..at].ends_with('\r') => "\r\n",
+                _ => "\n",
+            },
+        };
+        read.read_declarations();
+        read
+    }
+
+    fn word(&self, token: usize) -> &'a str {
+        self.tokens
+            .get(token)
+            .map_or("", |token| &self.text[token.span.clone()])
+    }
+
+    fn is_word(&self, token: usize) -> bool {
+        self.tokens
+            .get(token)
+            .is_some_and(|token| token.kind == Kind::Word)
+    }
+
+    fn read_declarations(&mut self) {
+        let mut at = 0;
+        while at < self.tokens.len() {
+            let start = at;
+            while self.word(at) == "@" {
+                at = self.after_attribute(at);
+            }
+            let keyword = match self.word(at) {
+                "fn" => Some(Keyword::Fn),
+                "struct" => Some(Keyword::Struct),
+                "const" => Some(Keyword::Const),
+                "override" => Some(Keyword::Override),
+                "var" => Some(Keyword::Var),
+                "alias" => Some(Keyword::Alias),
+                _ => None,
+            };
+            let directive =
+                start == at && matches!(self.word(at), "enable" | "requires" | "diagnostic");
+            let end = self.after_item(at);
+            let span = self.tokens[start].span.start..self.tokens[end - 1].span.end;
+            if directive {
+                self.directives.push(&self.text[span]);
+            } else if let Some(keyword) = keyword {
+                let mut name = at + 1;
+                if keyword == Keyword::Var && self.word(name) == "<" {
+                    while name < end && self.word(name) != ">" {
+                        name += 1;
+                    }
+                    name += 1;
+                }
+                if name < end && self.is_word(name) {
+                    self.declarations.push(Declaration {
+                        keyword,
+                        name: self.word(name).to_owned(),
+                        name_span: self.tokens[name].span.clone(),
+                        span,
+                        tokens: start..end,
+                    });
+                }
+            }
+            at = end;
+        }
+    }
+
+    /// The token after the attribute at `at`.
+    fn after_attribute(&self, at: usize) -> usize {
+        let name = at + 1;
+        if self.word(name + 1) == "(" {
+            self.after_group(name + 1)
+        } else {
+            name + 1
+        }
+    }
+
+    /// The token after the bracket that closes the one at `at`.
+    fn after_group(&self, at: usize) -> usize {
+        let mut depth = 0usize;
+        for token in at..self.tokens.len() {
+            match self.word(token) {
+                "(" | "[" | "{" => depth += 1,
+                ")" | "]" | "}" => {
+                    depth = depth.saturating_sub(1);
+                    if depth == 0 {
+                        return token + 1;
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.tokens.len()
+    }
+
+    /// The token after the item at `at`: after its `;`, or after its body and the `;` that may follow it.
+    fn after_item(&self, mut at: usize) -> usize {
+        while at < self.tokens.len() {
+            match self.word(at) {
+                ";" => return at + 1,
+                "{" => return self.after_group(at),
+                "(" | "[" => at = self.after_group(at),
+                _ => at += 1,
+            }
+        }
+        self.tokens.len()
+    }
+
+    /// The declaration of a name at module scope.
+    pub(crate) fn declaration(&self, name: &str) -> Option<&Declaration> {
+        self.declarations.iter().find(|d| d.name == name)
+    }
+
+    /// The signature of a function.
+    pub(crate) fn signature(&self, name: &str) -> Option<Signature> {
+        let declaration = self
+            .declarations
+            .iter()
+            .find(|d| d.keyword == Keyword::Fn && d.name == name)?;
+        let all = declaration.tokens.clone();
+        let mut attributes = Vec::new();
+        let mut parameters = Vec::new();
+        let mut returns = false;
+        let mut depth = 0usize;
+        let mut at = all.start;
+        while at < all.end && self.word(at) != "{" {
+            match self.word(at) {
+                "@" => {
+                    let end = self.after_attribute(at).min(all.end);
+                    attributes.push((at..end).map(|t| self.tokens[t].span.clone()).collect());
+                    at = end;
+                    continue;
+                }
+                "(" | "[" => depth += 1,
+                ")" | "]" => depth = depth.saturating_sub(1),
+                "-" if depth == 0 && self.word(at + 1) == ">" => returns = true,
+                ":" if depth == 1 => parameters.push(self.tokens[at - 1].span.clone()),
+                _ => {}
+            }
+            at += 1;
+        }
+        Some(Signature {
+            span: self.tokens[all.start].span.start..self.tokens[at - 1].span.end,
+            name: declaration.name_span.clone(),
+            parameters,
+            returns,
+            attributes,
+        })
+    }
+
+    /// What a function's text lets pass for derivatives in control flow that is not uniform: the most
+    /// lenient `@diagnostic(severity, derivative_uniformity)` in the text, at any place. Level functions
+    /// hold code from all over the text, so they carry it.
+    pub(crate) fn derivative_attribute(&self) -> Option<String> {
+        let lenience = ["error", "warning", "info", "off"];
+        (0..self.tokens.len())
+            .filter(|at| {
+                self.word(*at) == "@"
+                    && self.word(at + 1) == "diagnostic"
+                    && self.word(at + 2) == "("
+                    && self.word(at + 5) == "derivative_uniformity"
+            })
+            .filter_map(|at| lenience.iter().position(|word| *word == self.word(at + 3)))
+            .max()
+            .map(|found| format!("@diagnostic({}, derivative_uniformity)", lenience[found]))
+    }
+}
+
+impl Signature {
+    /// The text with this function made an ordinary one: its name replaced, and every attribute taken off
+    /// that belongs to entry points. Line ends and comments stay, so that every line keeps its number.
+    pub(crate) fn demoted(&self, text: &Text<'_>, name: &str) -> String {
+        let mut out = String::with_capacity(text.text.len() + name.len());
+        let mut at = 0;
+        let mut edits: BTreeMap<usize, (Range<usize>, &str)> = BTreeMap::new();
+        edits.insert(self.name.start, (self.name.clone(), name));
+        for attribute in &self.attributes {
+            let kept = attribute
+                .get(1)
+                .is_some_and(|word| matches!(&text.text[word.clone()], "diagnostic" | "must_use"));
+            if kept {
+                continue;
+            }
+            for (place, token) in attribute.iter().enumerate() {
+                let mut span = token.clone();
+                if place + 1 == attribute.len() {
+                    let after = &text.text[span.end..];
+                    span.end += after.len() - after.trim_start_matches([' ', '\t']).len();
+                }
+                edits.insert(span.start, (span, ""));
+            }
+        }
+        for (span, with) in edits.into_values() {
+            out.push_str(&text.text[at..span.start]);
+            out.push_str(with);
+            at = span.end;
+        }
+        out.push_str(&text.text[at..]);
+        out
+    }
+
+    /// The signature as it stands, with parameters renamed where `rename` says so, and the parameters' names
+    /// after that.
+    pub(crate) fn with_parameters(
+        &self,
+        text: &Text<'_>,
+        mut rename: impl FnMut(&str) -> Option<String>,
+    ) -> (String, Vec<String>) {
+        let mut out = String::new();
+        let mut names = Vec::new();
+        let mut at = self.span.start;
+        for parameter in &self.parameters {
+            let name = &text.text[parameter.clone()];
+            let name = rename(name).unwrap_or_else(|| name.to_owned());
+            out.push_str(&text.text[at..parameter.start]);
+            out.push_str(&name);
+            at = parameter.end;
+            names.push(name);
+        }
+        out.push_str(&text.text[at..self.span.end]);
+        (out, names)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn demoted(text: &str) -> String {
+        let text = Text::new(text);
+        let signature = text.signature("main").expect("it is there");
+        signature.demoted(&text, "original_main")
+    }
+
+    #[test]
+    fn takes_off_stage_and_io_attributes_alone() {
+        assert_eq!(
+            demoted(
+                "@diagnostic(off, derivative_uniformity) @fragment fn main(@location(0) @interpolate(flat, either) id: u32, \
+                 @builtin(position) p: vec4<f32>) -> @location(0) vec4f { return p; }"
+            ),
+            "@diagnostic(off, derivative_uniformity) fn original_main(id: u32, p: vec4<f32>) -> vec4f { return p; }"
+        );
+    }
+
+    #[test]
+    fn finds_attributes_in_odd_orders_and_layouts() {
+        assert_eq!(
+            demoted(
+                "@early_depth_test(less_equal)\n@ fragment // why\n/* fn no() */ fn\nmain() { }"
+            ),
+            "\n // why\n/* fn no() */ fn\noriginal_main() { }"
+        );
+        assert_eq!(
+            demoted("@fragment fn main(@location /* slot */ (0,) a: f32) {}"),
+            "fn original_main( /* slot */ a: f32) {}"
+        );
+    }
+
+    #[test]
+    fn leaves_comments_other_functions_and_line_ends() {
+        let text = "// @fragment fn main()\r\n/* fn main */\r\nfn mainly() {}\r\n@fragment\r\nfn main() {\r\n  let main_ = 1;\r\n}";
+        let after = demoted(text);
+        assert_eq!(
+            after,
+            "// @fragment fn main()\r\n/* fn main */\r\nfn mainly() {}\r\n\r\nfn original_main() {\r\n  let main_ = 1;\r\n}"
+        );
+        assert_eq!(Text::new(text).line_end, "\r\n");
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_text() {
+        let text = Text::new("\u{feff}@fragment fn main() {}");
+        assert_eq!(text.declarations[0].span, 0..22);
+    }
+
+    #[test]
+    fn reads_declarations_with_templates_and_initialisers() {
+        let text = Text::new(
+            "enable f16; diagnostic(off, derivative_uniformity);
+            alias A = vec4<f32>; struct S { a: A, b: f32, }; const_assert 1 < 2;
+            @group(0) @binding(1) var<storage, read> data: array<S, 4>; @id(3) override gain = 1.0;
+            const größe = array(1, 2)[1]; var<private> last: f32;
+            @must_use fn f(a: ptr<function, S>) -> f32 { if (a.b < 1.0) { return 1.0; } return 2.0; }
+            ; fn g() {} ",
+        );
+        let names: Vec<_> = text
+            .declarations
+            .iter()
+            .map(|d| (d.keyword, d.name.as_str()))
+            .collect();
+        assert_eq!(
+            names,
+            [
+                (Keyword::Alias, "A"),
+                (Keyword::Struct, "S"),
+                (Keyword::Var, "data"),
+                (Keyword::Override, "gain"),
+                (Keyword::Const, "größe"),
+                (Keyword::Var, "last"),
+                (Keyword::Fn, "f"),
+                (Keyword::Fn, "g"),
+            ]
+        );
+        assert_eq!(
+            text.directives,
+            ["enable f16;", "diagnostic(off, derivative_uniformity);"]
+        );
+    }
+
+    #[test]
+    fn signatures_know_parameters_and_results() {
+        let text = Text::new(
+            "@fragment fn main(@location(0) a: array<vec2<f32>, 2>, @builtin(front_facing) b: bool,) // no { here\n{ }",
+        );
+        let signature = text.signature("main").expect("it is there");
+        let (written, names) =
+            signature.with_parameters(&text, |name| (name == "a").then(|| "c".to_owned()));
+        assert_eq!(names, ["c", "b"]);
+        assert!(!signature.returns);
+        assert_eq!(
+            written,
+            "@fragment fn main(@location(0) c: array<vec2<f32>, 2>, @builtin(front_facing) b: bool,)"
+        );
+        assert!(
+            Text::new("fn main() -> @location(0) vec4f {}")
+                .signature("main")
+                .expect("it is there")
+                .returns
+        );
+    }
+
+    #[test]
+    fn the_most_lenient_diagnostic_wins() {
+        let text = Text::new(
+            "@diagnostic(warning, derivative_uniformity) fn a() {} fn b() { @diagnostic(off, derivative_uniformity) if true {} }",
+        );
+        assert_eq!(
+            text.derivative_attribute().as_deref(),
+            Some("@diagnostic(off, derivative_uniformity)")
+        );
+        assert_eq!(Text::new("fn a() {}").derivative_attribute(), None);
+    }
+}
