@@ -11,8 +11,10 @@
 //! and [`write_atomically`] is the only thing that touches the disk.
 
 mod lines;
+mod lock;
 mod names;
 mod print;
+mod says;
 mod source;
 mod splice;
 mod targets;
@@ -20,12 +22,13 @@ mod tidy;
 mod tokens;
 mod write;
 
+pub use lock::{FORMAT, Lock, LockedFile, LockedLevel, LockedSource, LockedTexture, figure, hash};
+pub use says::says;
 pub use write::write_atomically;
 
+use crate::front::{Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::Shader;
-use naga::Module;
-use naga::valid::ModuleInfo;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -59,6 +62,17 @@ pub enum Target {
     Msl,
 }
 
+impl Form {
+    /// Its name on the command line and in the lock.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Override => "override",
+            Self::Uniform => "uniform",
+            Self::Files => "files",
+        }
+    }
+}
+
 impl Target {
     /// Its name on the command line and in messages.
     pub fn name(self) -> &'static str {
@@ -80,39 +94,6 @@ pub struct Output {
     pub form: Form,
     /// The language.
     pub target: Target,
-}
-
-/// The author's shader.
-#[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
-    /// The file, as the user named it.
-    pub name: &'a str,
-    /// Its text.
-    pub text: &'a str,
-    /// The valid module that the text was parsed to, not normalised.
-    pub module: &'a Module,
-    /// The fragment entry point that has levels.
-    pub fragment: &'a str,
-    /// The vertex entry point that goes with it.
-    pub vertex: Option<&'a str>,
-}
-
-impl Source<'_> {
-    /// The file's name without folders, `brick.wgsl`.
-    pub fn file_name(&self) -> String {
-        Path::new(self.name).file_name().map_or_else(
-            || self.name.to_owned(),
-            |name| name.to_string_lossy().into_owned(),
-        )
-    }
-
-    /// The file's name without folders and extension, `brick`.
-    pub fn stem(&self) -> String {
-        Path::new(self.name).file_stem().map_or_else(
-            || self.name.to_owned(),
-            |name| name.to_string_lossy().into_owned(),
-        )
-    }
 }
 
 /// A level below the original: a variant, and from where it is used. The figures are for people.
@@ -138,54 +119,32 @@ pub struct EmitLevel {
 /// When the form cannot be carried by the target, the thresholds do not rise, the source declares an `autoLOD`
 /// that cannot be used, or a writer has no form for something in the shader.
 pub fn emit(
-    source: &Source<'_>,
+    source: &Source,
     levels: &[EmitLevel],
     output: Output,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     check_thresholds(levels)?;
-    let stem = source.stem();
+    let stem = stem(source);
+    let written = |stem: String, text: String| -> Result<Vec<(PathBuf, Vec<u8>)>> {
+        let read = read_back(&text, source)?;
+        match output.target {
+            Target::Wgsl => Ok(vec![(format!("{stem}.wgsl").into(), text.into_bytes())]),
+            target => targets::write(source, &read, target, &stem),
+        }
+    };
     match output.form {
         Form::Override | Form::Uniform => {
             let spliced = splice::splice(source, levels, output.form)?;
-            if output.target == Target::Wgsl {
-                parse(&spliced.text, source)?;
-                return Ok(vec![(
-                    format!("{stem}.lod.wgsl").into(),
-                    spliced.text.into_bytes(),
-                )]);
-            }
-            if spliced.by_override {
+            if output.target != Target::Wgsl && spliced.by_override {
                 return Err(no_override(output.target));
             }
-            let (module, info) = parse(&spliced.text, source)?;
-            targets::write(
-                source,
-                &module,
-                &info,
-                output.target,
-                &format!("{stem}.lod"),
-            )
+            written(format!("{stem}.lod"), spliced.text)
         }
         Form::Files => {
-            let mut files = Vec::new();
-            for level in 0..=levels.len() {
-                let stem = format!("{stem}.lod{level}");
-                let text = match level.checked_sub(1) {
-                    None => source.text.to_owned(),
-                    Some(at) => splice::alone(source, level, &levels[at])?,
-                };
-                let (module, info) = parse(text.strip_prefix('\u{feff}').unwrap_or(&text), source)?;
-                if output.target == Target::Wgsl {
-                    files.push((format!("{stem}.wgsl").into(), text.into_bytes()));
-                } else {
-                    files.extend(targets::write(
-                        source,
-                        &module,
-                        &info,
-                        output.target,
-                        &stem,
-                    )?);
-                }
+            let mut files = written(format!("{stem}.lod0"), source.text.clone())?;
+            for (at, level) in levels.iter().enumerate() {
+                let text = splice::alone(source, at + 1, level)?;
+                files.extend(written(format!("{stem}.lod{}", at + 1), text)?);
             }
             Ok(files)
         }
@@ -217,27 +176,43 @@ fn no_override(target: Target) -> Box<Diagnostic> {
     .with_note("`--form uniform` chooses a level by a uniform buffer, `--form files` writes one file a level")
 }
 
-/// Parses and validates an emitted text. What fails here is a flaw of lodc's.
-fn parse(text: &str, source: &Source<'_>) -> Result<(Module, ModuleInfo)> {
-    let flaw = |message: String, labels: Vec<(std::ops::Range<usize>, String)>| {
-        let mut flaw = Diagnostic::error(format!(
-            "internal error: the emitted shader is not valid: {message}"
-        ))
-        .with_source(format!("{} (as emitted)", source.file_name()), text)
-        .with_note(format!(
-            "this is a flaw of lodc: please report it with {} and its lock; nothing was written",
-            source.file_name()
-        ));
-        flaw.labels = labels;
-        flaw
+/// Reads an emitted text as any shader is read. What fails here is a flaw of lodc's.
+fn read_back(text: &str, source: &Source) -> Result<Source> {
+    let stages = Stages {
+        vertex: source.vertex.clone(),
+        fragment: Some(source.fragment.clone()),
     };
-    let module = naga::front::wgsl::parse_str(text).map_err(|error| {
-        let labels = error
-            .labels()
-            .filter_map(|(span, remark)| Some((span.to_range()?, remark.to_owned())))
-            .collect();
-        flaw(error.message().to_owned(), labels)
-    })?;
-    let info = print::validate(&module).map_err(|message| flaw(message, Vec::new()))?;
-    Ok((module, info))
+    let name = format!("{} (as emitted)", source.name);
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    Source::parse_stages(&name, text, &stages).map_err(|mut error| {
+        error.message = format!(
+            "internal error: the emitted shader is not valid: {}",
+            error.message
+        );
+        flaw(error, source)
+    })
+}
+
+/// Says of an error that it is lodc's own.
+fn flaw(error: Box<Diagnostic>, source: &Source) -> Box<Diagnostic> {
+    error.with_note(format!(
+        "this is a flaw of lodc: please report it with {} and its lock; nothing was written",
+        file_name(source)
+    ))
+}
+
+/// The file's name without folders, `brick.wgsl`.
+fn file_name(source: &Source) -> String {
+    Path::new(&source.name).file_name().map_or_else(
+        || source.name.clone(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// The file's name without folders and extension, `brick`.
+fn stem(source: &Source) -> String {
+    Path::new(&source.name).file_stem().map_or_else(
+        || source.name.clone(),
+        |name| name.to_string_lossy().into_owned(),
+    )
 }

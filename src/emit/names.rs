@@ -126,7 +126,7 @@ pub(crate) fn in_words(n: usize) -> String {
     ];
     match n {
         0..20 => ONES[n].to_owned(),
-        20..100 if n % 10 == 0 => TENS[n / 10 - 2].to_owned(),
+        20..100 if n.is_multiple_of(10) => TENS[n / 10 - 2].to_owned(),
         20..100 => format!("{}_{}", TENS[n / 10 - 2], ONES[n % 10]),
         _ => letters(n),
     }

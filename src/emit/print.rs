@@ -9,9 +9,9 @@ use super::names::{Names, letters};
 use super::source::{Keyword, Text};
 use super::tidy::{Style, tidy, with_short_types};
 use super::tokens::{Kind, tokens};
+use crate::front;
 use lodc_passes::shader::Stage;
 use naga::back::wgsl::WriterFlags;
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{Expression, Function, Handle, Module, Type, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -97,7 +97,13 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
         entry.name = labels.add(global(Some(&entry.name), "entry"));
     }
 
-    let info = validate(&module)?;
+    let info = front::validate(&module).map_err(|error| {
+        let inner = error.as_inner();
+        match std::error::Error::source(inner) {
+            Some(reason) => format!("{inner}: {reason}"),
+            None => inner.to_string(),
+        }
+    })?;
     let mut scopes = Vec::new();
     let mut owners = BTreeMap::new();
     let handles: Vec<_> = module.functions.iter().map(|(handle, _)| handle).collect();
@@ -194,21 +200,6 @@ fn label_types(
         }
         module.types.replace(handle, ty);
     }
-}
-
-/// Validates a module with everything allowed that naga knows.
-pub(crate) fn validate(module: &Module) -> Result<ModuleInfo, String> {
-    Validator::new(ValidationFlags::all(), Capabilities::all())
-        .validate(module)
-        .map_err(|error| {
-            let mut text = error.as_inner().to_string();
-            let mut source = std::error::Error::source(error.as_inner());
-            while let Some(inner) = source {
-                text = format!("{text}: {inner}");
-                source = inner.source();
-            }
-            text
-        })
 }
 
 /// Placeholders and the names that they stand for.

@@ -255,13 +255,10 @@ impl Signature {
             if kept {
                 continue;
             }
-            for (place, token) in attribute.iter().enumerate() {
-                let mut span = token.clone();
-                if place + 1 == attribute.len() {
-                    let after = &text.text[span.end..];
-                    span.end += after.len() - after.trim_start_matches([' ', '\t']).len();
-                }
-                edits.insert(span.start, (span, ""));
+            for token in attribute {
+                let after = &text.text[token.end..];
+                let blanks = after.len() - after.trim_start_matches([' ', '\t']).len();
+                edits.insert(token.start, (token.start..token.end + blanks, ""));
             }
         }
         for (span, with) in edits.into_values() {
@@ -323,11 +320,11 @@ mod tests {
             demoted(
                 "@early_depth_test(less_equal)\n@ fragment // why\n/* fn no() */ fn\nmain() { }"
             ),
-            "\n // why\n/* fn no() */ fn\noriginal_main() { }"
+            "\n// why\n/* fn no() */ fn\noriginal_main() { }"
         );
         assert_eq!(
             demoted("@fragment fn main(@location /* slot */ (0,) a: f32) {}"),
-            "fn original_main( /* slot */ a: f32) {}"
+            "fn original_main(/* slot */ a: f32) {}"
         );
     }
 

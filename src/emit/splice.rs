@@ -1,17 +1,16 @@
 //! Puts levels behind the author's text, or each into a file of its own.
 
+use super::lock::FORMAT;
 use super::names::{Names, in_words, is_predeclared};
 use super::print::{Item, Owner, Printed, Wishes, print, value_name};
 use super::source::{Keyword, Text};
-use super::{EmitLevel, Form, Source, tidy};
+use super::{EmitLevel, Form, file_name, flaw, read_back, stem, tidy};
+use crate::front::Source;
 use crate::{Diagnostic, Result};
 use lodc_passes::shader::Stage;
 use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
 use std::collections::BTreeSet;
 use std::fmt::Write;
-
-/// The format of the lock that the header names.
-const LOCK_FORMAT: u32 = 1;
 
 /// The author's text with its levels.
 pub(crate) struct Spliced {
@@ -21,9 +20,9 @@ pub(crate) struct Spliced {
 }
 
 /// The author's text, with the fragment entry point replaced by one that chooses among it and the levels.
-pub(crate) fn splice(source: &Source<'_>, levels: &[EmitLevel], form: Form) -> Result<Spliced> {
-    let text = Text::new(source.text);
-    match spliced(source, &text, source.module, levels, form)? {
+pub(crate) fn splice(source: &Source, levels: &[EmitLevel], form: Form) -> Result<Spliced> {
+    let text = Text::new(&source.text);
+    match spliced(source, &text, &source.module, levels, form)? {
         Some(spliced) => Ok(spliced),
         None => {
             // A declaration of the author's hides something predeclared that a level needs. In a text of our
@@ -31,18 +30,17 @@ pub(crate) fn splice(source: &Source<'_>, levels: &[EmitLevel], form: Form) -> R
             let (composed, module) = composed(source)?;
             let text = Text::new(&composed);
             spliced(source, &text, &module, levels, form)?.ok_or_else(|| {
-                Diagnostic::error("internal error: names still clash in a composed module")
-                    .with_note(format!(
-                        "this is a flaw of lodc: please report it with {}",
-                        source.file_name()
-                    ))
+                flaw(
+                    Diagnostic::error("internal error: names still clash in a composed module"),
+                    source,
+                )
             })
         }
     }
 }
 
 /// The whole source as one module in which nothing hides what is predeclared.
-fn composed(source: &Source<'_>) -> Result<(String, Module)> {
+fn composed(source: &Source) -> Result<(String, Module)> {
     let kept: BTreeSet<&str> = source
         .module
         .entry_points
@@ -57,29 +55,29 @@ fn composed(source: &Source<'_>) -> Result<(String, Module)> {
         )
         .collect();
     let printed = print(
-        source.module,
+        &source.module,
         &Wishes {
             keep: &|name| kept.contains(name),
             taken: &Names::default(),
             outside: &Names::default(),
             value: &|_, _| None,
-            short_types: uses_short_types(&Text::new(source.text)),
+            short_types: uses_short_types(&Text::new(&source.text)),
         },
     )
     .map_err(|reason| unwritable(source, &reason))?;
-    let author = Text::new(source.text);
+    let author = Text::new(&source.text);
     let text = assembled(
         "",
         &directives(&author, &printed),
         &printed.items.iter().collect::<Vec<_>>(),
     );
-    let (module, _) = super::parse(&text, source)?;
+    let module = read_back(&text, source)?.module;
     Ok((text, module))
 }
 
 /// `None` when a declaration of the text hides something predeclared that a level needs.
 fn spliced(
-    source: &Source<'_>,
+    source: &Source,
     text: &Text<'_>,
     module: &Module,
     levels: &[EmitLevel],
@@ -105,7 +103,7 @@ fn spliced(
             by_override: control.by_override,
         }));
     }
-    let Some(signature) = text.signature(source.fragment) else {
+    let Some(signature) = text.signature(&source.fragment) else {
         return Err(Diagnostic::error(format!(
             "`{}` is no function of {}",
             source.fragment, source.name
@@ -203,7 +201,7 @@ fn spliced(
 
 /// The function of a level, written with what it needs.
 fn level_function(
-    source: &Source<'_>,
+    source: &Source,
     text: &Text<'_>,
     level: &EmitLevel,
     name: &str,
@@ -247,8 +245,8 @@ fn level_function(
 }
 
 /// A level as a module of its own, with the author's names.
-pub(crate) fn alone(source: &Source<'_>, number: usize, level: &EmitLevel) -> Result<String> {
-    let text = Text::new(source.text);
+pub(crate) fn alone(source: &Source, number: usize, level: &EmitLevel) -> Result<String> {
+    let text = Text::new(&source.text);
     let declared: BTreeSet<&str> = text.declarations.iter().map(|d| d.name.as_str()).collect();
     let module = level.shader.module();
     let entries: BTreeSet<&str> = module
@@ -318,10 +316,10 @@ pub(crate) fn alone(source: &Source<'_>, number: usize, level: &EmitLevel) -> Re
         }
     }
     let header = format!(
-        "// Level {number} of {}, by lodc (lock format {LOCK_FORMAT}). Made from {}.lod.toml: change that, not this.\n\
+        "// Level {number} of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
          // From autoLOD {:.2} on. {}\n\n",
-        source.file_name(),
-        source.stem(),
+        file_name(source),
+        stem(source),
         level.autolod,
         sentence(&level.says),
     );
@@ -366,15 +364,12 @@ fn assembled(header: &str, directives: &[String], items: &[&Item]) -> String {
     out
 }
 
-fn unwritable(source: &Source<'_>, reason: &str) -> Box<Diagnostic> {
-    Diagnostic::error(format!(
-        "internal error: a level of {} cannot be written: {reason}",
-        source.file_name()
-    ))
-    .with_note(format!(
-        "this is a flaw of lodc: please report it with {} and its lock; nothing was written",
-        source.file_name()
-    ))
+fn unwritable(source: &Source, reason: &str) -> Box<Diagnostic> {
+    let error = Diagnostic::error(format!(
+        "internal error: {} cannot be written: {reason}",
+        file_name(source)
+    ));
+    flaw(error, source)
 }
 
 /// Whether types are written `vec3f`: unless the author writes `vec3<f32>`.
@@ -383,13 +378,13 @@ fn uses_short_types(text: &Text<'_>) -> bool {
 }
 
 /// The comment at the top: a function of the levels and the file's name alone.
-fn header(source: &Source<'_>, levels: &[EmitLevel]) -> String {
+fn header(source: &Source, levels: &[EmitLevel]) -> String {
     let mut out = format!(
-        "// Levels of detail of {}, by lodc (lock format {LOCK_FORMAT}). Made from {}.lod.toml: change that, not this.\n\
+        "// Levels of detail of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
          // level  autoLOD  error  cost  what changed\n\
          // 0      0.00     -      1.00  the original\n",
-        source.file_name(),
-        source.stem(),
+        file_name(source),
+        stem(source),
     );
     for (at, level) in levels.iter().enumerate() {
         writeln!(
@@ -464,7 +459,7 @@ const NAME: &str = "autoLOD";
 
 impl Control {
     fn new(
-        source: &Source<'_>,
+        source: &Source,
         text: &Text<'_>,
         module: &Module,
         form: Form,
@@ -479,7 +474,7 @@ impl Control {
             return Err(Diagnostic::error(format!(
                 "`{NAME}` is declared, but not as something that a host sets"
             ))
-            .with_source(source.name, source.text)
+            .with_source(&source.name, &source.text)
             .with_label(
                 span.start + shift..span.end + shift,
                 "this is no `override` and no uniform of type f32",

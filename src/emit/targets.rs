@@ -1,6 +1,7 @@
 //! Other languages than WGSL, through naga's writers.
 
-use super::{Source, Target, print};
+use super::{Target, file_name};
+use crate::front::{self, Source};
 use crate::{Diagnostic, Result};
 use naga::back::{glsl, hlsl, msl, pipeline_constants, spv};
 use naga::proc::BoundsCheckPolicies;
@@ -9,41 +10,43 @@ use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
-/// Writes a module in another language: `stem.spv`, `stem.hlsl`, `stem.metal`, or `stem.vert.glsl` and
+/// Writes an emitted module in another language: `stem.spv`, `stem.hlsl`, `stem.metal`, or `stem.vert.glsl` and
 /// `stem.frag.glsl`. Coordinates and binding numbers are those of the source.
 ///
 /// # Errors
 /// When the language, or naga's writer of it, has no form for something in the module.
 pub(crate) fn write(
-    source: &Source<'_>,
-    module: &Module,
-    info: &ModuleInfo,
+    source: &Source,
+    emitted: &Source,
     target: Target,
     stem: &str,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     let refused = |reason: String| {
         Diagnostic::error(format!(
             "{} cannot be written as {}: {reason}",
-            source.file_name(),
+            file_name(source),
             target.name()
         ))
         .with_note("`--target wgsl` writes it as it is")
     };
-    let (module, _) = pipeline_constants::process_overrides(module, info, None, &Default::default())
+    let (module, _) = pipeline_constants::process_overrides(&emitted.module, &emitted.info, None, &Default::default())
         .map_err(|e| {
             refused(e.to_string()).with_note(format!(
                 "{} has no pipeline constants, so each `override` of the source stands for its default there",
                 target.name()
             ))
         })?;
-    let stages: Vec<(ShaderStage, &str)> = (source.vertex.map(|name| (ShaderStage::Vertex, name)))
-        .into_iter()
-        .chain([(ShaderStage::Fragment, source.fragment)])
-        .collect();
+    let stages: Vec<(ShaderStage, &str)> = (emitted
+        .vertex
+        .as_deref()
+        .map(|name| (ShaderStage::Vertex, name)))
+    .into_iter()
+    .chain([(ShaderStage::Fragment, emitted.fragment.as_str())])
+    .collect();
     // The writers panic on what they have no form for, such as an immediate without a place in HLSL.
     let written = catch_unwind(AssertUnwindSafe(|| {
         let module = &only_stages(&module, &stages);
-        let info = &print::validate(module)?;
+        let info = &front::validate(module).map_err(|e| e.as_inner().to_string())?;
         match target {
             Target::Wgsl => Ok(Vec::new()),
             Target::Spirv => spirv(module, info).map(|bytes| vec![("spv", bytes)]),

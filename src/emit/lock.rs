@@ -1,0 +1,653 @@
+//! The lock: all that decides the emitted shader, as a TOML file that a person can read and commit.
+//!
+//! ```text
+//! search --> Lock --to_toml--> rock.lod.toml --parse--> Lock --replay--> [EmitLevel] --emit--> files
+//! ```
+//!
+//! Numbers that a recipe bakes are there twice: as decimals for people, and as the bits of an f32 in
+//! hexadecimal. The bits decide.
+
+use super::{EmitLevel, Output};
+use crate::front::read_text;
+use crate::{Diagnostic, Result};
+use lodc_passes::{Candidate, PASSES, Recipe, Shader};
+use serde::Deserialize;
+use std::fmt::Write;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+
+/// The format that this lodc writes, and the newest that it reads.
+pub const FORMAT: u32 = 1;
+
+/// A result that can be made again without searching.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lock {
+    /// The shader that it was made from.
+    pub source: LockedSource,
+    /// The scene file that errors were measured over; `None` when there was none, and all was inferred.
+    pub scene: Option<LockedFile>,
+    /// Every texture whose texels went into a number of a recipe.
+    pub textures: Vec<LockedTexture>,
+    /// What is emitted.
+    pub output: Output,
+    /// The seed of everything that was drawn at random, below 2^63 (TOML has no larger integers).
+    pub seed: u64,
+    /// Pixels on screen per object unit at the nearest distance, where autoLOD is 0.
+    pub rho0: f64,
+    /// The levels below the original, nearest first.
+    pub levels: Vec<LockedLevel>,
+}
+
+/// The shader of a lock.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LockedSource {
+    /// The file, relative to the lock.
+    pub file: String,
+    /// The fingerprint of its normal form ([`lodc_passes::Fingerprint`]); the lock is stale when it differs.
+    pub normal_form: String,
+    /// The vertex entry point; `None` when the file has none.
+    pub vertex: Option<String>,
+    /// The fragment entry point.
+    pub fragment: String,
+}
+
+/// A file of a lock.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LockedFile {
+    /// The file, relative to the lock.
+    pub file: String,
+    /// Its contents, as [`hash`] gives them.
+    pub hash: String,
+}
+
+/// A texture of a lock.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LockedTexture {
+    /// The variable in the shader.
+    pub name: String,
+    /// The file, relative to the lock.
+    pub file: String,
+    /// Its contents, as [`hash`] gives them.
+    pub hash: String,
+    /// Texels per pixel where autoLOD is 0, when it is known.
+    pub texels_per_pixel: Option<f64>,
+}
+
+/// A level of a lock.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LockedLevel {
+    /// The autoLOD from which it is used.
+    pub autolod: f32,
+    /// The distance at which that is reached, in world units.
+    pub distance: f64,
+    /// Root mean square error, of display values in 0..1.
+    pub error: f64,
+    /// The error of the original itself.
+    pub floor: f64,
+    /// How much more than the original's the error may be.
+    pub bound: f64,
+    /// Cost, as a share of the original's.
+    pub cost: f64,
+    /// What changed, for people.
+    pub says: String,
+    /// What is done to the original.
+    pub recipe: Recipe,
+}
+
+/// The hash of a file's contents as a lock holds it: `blake3:` and 64 hexadecimal digits.
+pub fn hash(bytes: &[u8]) -> String {
+    format!("blake3:{}", blake3::hash(bytes).to_hex())
+}
+
+/// A figure for people, rounded to four significant digits. The figures of a lock are made with it, so that
+/// they are short, and the same in every place that shows them.
+pub fn figure(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
+}
+
+impl Lock {
+    /// The lock as text. Reading it gives the same lock.
+    pub fn to_toml(&self) -> String {
+        let mut out = format!(
+            "# Made by lodc. Commit it: the levels of {} are made from this file.\n",
+            self.source.file.replace(['\n', '\r'], " ")
+        );
+        let mut line = |text: String| {
+            out.push_str(&text);
+            out.push('\n');
+        };
+        line(format!("format = {FORMAT}"));
+        let source = &self.source;
+        let vertex = source
+            .vertex
+            .as_ref()
+            .map_or(String::new(), |name| format!(", vertex = {}", string(name)));
+        line(format!(
+            "source = {{ file = {}, normal_form = {}{vertex}, fragment = {} }}",
+            string(&source.file),
+            string(&source.normal_form),
+            string(&source.fragment)
+        ));
+        if let Some(scene) = &self.scene {
+            line(format!(
+                "scene = {{ file = {}, hash = {} }}",
+                string(&scene.file),
+                string(&scene.hash)
+            ));
+        }
+        line(format!(
+            "output = {{ form = {}, target = {} }}",
+            string(self.output.form.name()),
+            string(self.output.target.name())
+        ));
+        line(format!("seed = {}", self.seed));
+        line(format!("rho0 = {}", number(self.rho0)));
+        if !self.textures.is_empty() {
+            line("textures = [".to_owned());
+            for texture in &self.textures {
+                let scale = texture.texels_per_pixel.map_or(String::new(), |x| {
+                    format!(", texels_per_pixel = {}", number(x))
+                });
+                line(format!(
+                    "  {{ name = {}, file = {}, hash = {}{scale} }},",
+                    string(&texture.name),
+                    string(&texture.file),
+                    string(&texture.hash)
+                ));
+            }
+            line("]".to_owned());
+        }
+        for level in &self.levels {
+            line(String::new());
+            line("[[level]]".to_owned());
+            line(format!("autolod = {:?}", level.autolod));
+            for (key, value) in [
+                ("distance", level.distance),
+                ("error", level.error),
+                ("floor", level.floor),
+                ("bound", level.bound),
+                ("cost", level.cost),
+            ] {
+                line(format!("{key} = {}", number(value)));
+            }
+            line(format!("says = {}", string(&level.says)));
+            line("recipe = [".to_owned());
+            for candidate in &level.recipe.0 {
+                line(format!("  {},", step(candidate)));
+            }
+            line("]".to_owned());
+        }
+        out
+    }
+
+    /// Reads a lock.
+    ///
+    /// # Errors
+    /// When the file cannot be read, and as [`Lock::parse`].
+    pub fn read(path: &Path) -> Result<(Self, String)> {
+        let text = read_text(path, "lock")?;
+        Ok((Self::parse(&path.display().to_string(), &text)?, text))
+    }
+
+    /// Reads a lock from text; `name` is what messages call the file.
+    ///
+    /// # Errors
+    /// At its place, when it is not TOML, has an unknown or missing key, is of a newer format, names an unknown
+    /// pass, bakes a number that is no f32, or has thresholds that do not rise.
+    pub fn parse(name: &str, text: &str) -> Result<Self> {
+        let at = |message: String, span: Range<usize>, remark: &str| {
+            Diagnostic::error(message)
+                .with_source(name, text)
+                .with_label(span, remark)
+        };
+        let format = read::<Format>(name, text)?.format;
+        if *format.get_ref() != i64::from(FORMAT) {
+            let wrong = format!("the lock has format {}", format.get_ref());
+            let error = at(
+                wrong,
+                format.span(),
+                &format!("this lodc reads format {FORMAT}"),
+            );
+            return Err(if *format.get_ref() > i64::from(FORMAT) {
+                error.with_note("it was made by a newer lodc: update lodc, or make the lock again without `--locked`")
+            } else {
+                error.with_note("make the lock again without `--locked`")
+            });
+        }
+        let raw: RawLock = read(name, text)?;
+        let mut levels: Vec<LockedLevel> = Vec::new();
+        for level in raw.level {
+            let before = levels
+                .last()
+                .map_or(0.0, |level: &LockedLevel| level.autolod);
+            if !(*level.autolod.get_ref() > before && level.autolod.get_ref().is_finite()) {
+                return Err(at(
+                    format!("a level starts at autoLOD {}", level.autolod.get_ref()),
+                    level.autolod.span(),
+                    &format!("has to be above {before}"),
+                )
+                .with_note("thresholds rise from level to level, and the first is above 0"));
+            }
+            let recipe = level
+                .recipe
+                .into_iter()
+                .map(|step| step.into_inner().candidate(&at))
+                .collect::<Result<Vec<_>>>()?;
+            levels.push(LockedLevel {
+                autolod: level.autolod.into_inner(),
+                distance: level.distance,
+                error: level.error,
+                floor: level.floor,
+                bound: level.bound,
+                cost: level.cost,
+                says: level.says,
+                recipe: Recipe(recipe),
+            });
+        }
+        Ok(Self {
+            source: LockedSource {
+                file: raw.source.file,
+                normal_form: raw.source.normal_form,
+                vertex: raw.source.vertex,
+                fragment: raw.source.fragment,
+            },
+            scene: raw.scene,
+            textures: raw.textures,
+            output: raw.output,
+            seed: raw.seed,
+            rho0: raw.rho0,
+            levels,
+        })
+    }
+
+    /// Makes every level again from the source's normal form. `name` and `text` are the lock as it was read,
+    /// so that errors can point into it.
+    ///
+    /// # Errors
+    /// When the source is no longer the one that the lock was made from, or a candidate no longer applies.
+    pub fn replay(&self, base: &Shader, name: &str, text: &str) -> Result<Vec<EmitLevel>> {
+        let now = base.fingerprint().to_string();
+        if now != self.source.normal_form {
+            let stale = Diagnostic::error(format!(
+                "the lock is stale: {} has changed since it was made",
+                self.source.file
+            ))
+            .with_source(name, text);
+            let stale = match text.find(&self.source.normal_form) {
+                Some(start) => stale.with_label(
+                    start..start + self.source.normal_form.len(),
+                    format!("the normal form is now {now}"),
+                ),
+                None => stale,
+            };
+            return Err(stale.with_note(format!(
+                "renew it: run lodc on {} without `--locked`, and commit what it writes",
+                self.source.file
+            )));
+        }
+        self.levels
+            .iter()
+            .enumerate()
+            .map(|(at, level)| {
+                let shader = level.recipe.replay(base).map_err(|failed| {
+                    let error = Diagnostic::error(format!(
+                        "step {} of level {} no longer applies: {}",
+                        failed.step + 1,
+                        at + 1,
+                        failed.candidate
+                    ))
+                    .with_source(name, text);
+                    let error = match place(text, at, failed.step) {
+                        Some(span) => error.with_label(span, failed.declined.0),
+                        None => error.with_reason(failed.declined.0),
+                    };
+                    error.with_note(format!(
+                        "make the lock again: run lodc on {} without `--locked`",
+                        self.source.file
+                    ))
+                })?;
+                Ok(EmitLevel {
+                    autolod: level.autolod,
+                    shader,
+                    distance: level.distance,
+                    error: level.error,
+                    cost: level.cost,
+                    says: level.says.clone(),
+                })
+            })
+            .collect()
+    }
+}
+
+/// One step of a recipe as an inline table.
+fn step(candidate: &Candidate) -> String {
+    let mut out = format!(
+        "{{ pass = {}, site = {}, choice = {}",
+        string(&candidate.pass),
+        string(&candidate.site.to_string()),
+        string(&candidate.choice)
+    );
+    if !candidate.value.is_empty() {
+        let decimals: Vec<String> = candidate.numbers().map(decimal).collect();
+        let bits: Vec<String> = candidate
+            .value
+            .iter()
+            .map(|bits| format!("\"{bits:08x}\""))
+            .collect();
+        write!(
+            out,
+            ", value = [{}], hex = [{}]",
+            decimals.join(", "),
+            bits.join(", ")
+        )
+        .ok();
+    }
+    out.push_str(" }");
+    out
+}
+
+/// As [`number`], with the digits that tell an f32 from its neighbours.
+fn decimal(x: f32) -> String {
+    if x.is_nan() {
+        "nan".to_owned()
+    } else {
+        format!("{x:?}")
+    }
+}
+
+/// A number as TOML writes it: the shortest that reads back as the same.
+fn number(x: f64) -> String {
+    if x.is_nan() {
+        "nan".to_owned()
+    } else {
+        format!("{x:?}")
+    }
+}
+
+/// A text as TOML writes it.
+fn string(text: &str) -> String {
+    toml::Value::String(text.replace(['\n', '\r'], " ")).to_string()
+}
+
+/// Where a step of a level's recipe is.
+fn place(text: &str, level: usize, step: usize) -> Option<Range<usize>> {
+    let raw: RawLock = toml::from_str(text).ok()?;
+    Some(raw.level.get(level)?.recipe.get(step)?.span())
+}
+
+fn read<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T> {
+    toml::from_str(text).map_err(|error| {
+        let broken = Diagnostic::error(format!(
+            "the lock cannot be read: {}",
+            error.message().replace('\n', ", ")
+        ))
+        .with_source(name, text);
+        let broken = match error.span() {
+            Some(span) => broken.with_label(span, "here"),
+            None => broken,
+        };
+        broken.with_note("restore it from version control, or make it again without `--locked`")
+    })
+}
+
+#[derive(Deserialize)]
+struct Format {
+    format: Spanned<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawLock {
+    #[serde(rename = "format")]
+    _format: i64,
+    source: RawSource,
+    scene: Option<LockedFile>,
+    #[serde(default)]
+    textures: Vec<LockedTexture>,
+    #[serde(default)]
+    output: Output,
+    seed: u64,
+    rho0: f64,
+    #[serde(default)]
+    level: Vec<RawLevel>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSource {
+    file: String,
+    normal_form: String,
+    vertex: Option<String>,
+    fragment: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawLevel {
+    autolod: Spanned<f32>,
+    distance: f64,
+    error: f64,
+    floor: f64,
+    bound: f64,
+    cost: f64,
+    says: String,
+    recipe: Vec<Spanned<RawStep>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStep {
+    pass: Spanned<String>,
+    site: String,
+    choice: String,
+    /// For people: not read.
+    #[serde(default, rename = "value")]
+    _value: Vec<f64>,
+    #[serde(default)]
+    hex: Vec<Spanned<String>>,
+}
+
+/// Makes an error at a place in the lock, with a remark.
+type Located<'a> = dyn Fn(String, Range<usize>, &str) -> Box<Diagnostic> + 'a;
+
+impl RawStep {
+    fn candidate(self, at: &Located<'_>) -> Result<Candidate> {
+        let known: Vec<&str> = PASSES.iter().map(|pass| pass.name()).collect();
+        if !known.contains(&self.pass.get_ref().as_str()) {
+            return Err(at(
+                format!("there is no pass `{}`", self.pass.get_ref()),
+                self.pass.span(),
+                "unknown",
+            )
+            .with_note(format!("the passes are {}", known.join(", "))));
+        }
+        let value = self
+            .hex
+            .into_iter()
+            .map(|hex| {
+                let digits = hex.get_ref();
+                let is_hex = digits.len() == 8 && digits.bytes().all(|b| b.is_ascii_hexdigit());
+                u32::from_str_radix(digits, 16).ok().filter(|_| is_hex).ok_or_else(|| {
+                    at(
+                        format!("`{digits}` is not the bits of an f32"),
+                        hex.span(),
+                        "has to be 8 hexadecimal digits",
+                    )
+                    .with_note("restore the lock from version control, or make it again without `--locked`")
+                })
+            })
+            .collect::<Result<Vec<u32>>>()?;
+        Ok(Candidate {
+            pass: self.pass.into_inner(),
+            site: self.site.as_str().into(),
+            choice: self.choice,
+            value,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Form, Target};
+    use super::*;
+
+    fn lock() -> Lock {
+        let candidate = |pass: &str, site: &str, choice: &str, value: &[f32]| Candidate {
+            pass: pass.into(),
+            site: site.into(),
+            choice: choice.into(),
+            value: value.iter().map(|x| x.to_bits()).collect(),
+        };
+        Lock {
+            source: LockedSource {
+                file: "a \"quoted\" brick.wgsl".into(),
+                normal_form: "00112233445566778899aabbccddeeff".into(),
+                vertex: None,
+                fragment: "fs_wall".into(),
+            },
+            scene: Some(LockedFile {
+                file: "brick.toml".into(),
+                hash: hash(b"scene"),
+            }),
+            textures: vec![LockedTexture {
+                name: "grime".into(),
+                file: "textures/grime.png".into(),
+                hash: hash(b"texture"),
+                texels_per_pixel: Some(0.1),
+            }],
+            output: Output {
+                form: Form::Uniform,
+                target: Target::Spirv,
+            },
+            seed: u64::from(u32::MAX) + 7,
+            rho0: 211.34,
+            levels: vec![
+                LockedLevel {
+                    autolod: 0.1,
+                    distance: 2.8,
+                    error: 1.0 / 3.0,
+                    floor: 1e-9,
+                    bound: 0.02,
+                    cost: 0.71,
+                    says: "größe, \"so\" it\\is".into(),
+                    recipe: Recipe(vec![
+                        candidate(
+                            "op-removal",
+                            "main.a.mul#0123456789abcdef",
+                            "keep main.a.pow",
+                            &[],
+                        ),
+                        candidate(
+                            "texture-removal",
+                            "main.b",
+                            "seen-mean",
+                            &[0.1, -0.0, 1e-40, f32::MAX],
+                        ),
+                    ]),
+                },
+                LockedLevel {
+                    autolod: 4.25,
+                    distance: 20.0,
+                    error: 0.0,
+                    floor: 0.0,
+                    bound: 0.0,
+                    cost: 1e300,
+                    says: String::new(),
+                    recipe: Recipe::default(),
+                },
+            ],
+        }
+    }
+
+    #[test]
+    fn what_was_written_reads_the_same() {
+        let lock = lock();
+        let text = lock.to_toml();
+        assert_eq!(
+            Lock::parse("brick.lod.toml", &text).expect("it reads"),
+            lock,
+            "{text}"
+        );
+        assert_eq!(Lock::parse("", &text).expect("it reads").to_toml(), text);
+    }
+
+    #[test]
+    fn it_is_pleasant() {
+        let text = lock().to_toml();
+        for line in [
+            "format = 1",
+            "seed = 4294967302",
+            "autolod = 0.1",
+            "  { pass = \"op-removal\", site = \"main.a.mul#0123456789abcdef\", choice = \"keep main.a.pow\" },",
+            "  { pass = \"texture-removal\", site = \"main.b\", choice = \"seen-mean\", \
+             value = [0.1, -0.0, 1e-40, 3.4028235e38], hex = [\"3dcccccd\", \"80000000\", \"000116c2\", \"7f7fffff\"] },",
+        ] {
+            assert!(text.lines().any(|have| have == line), "{line}\n{text}");
+        }
+    }
+
+    #[track_caller]
+    fn fails(text: &str, message: &str, label: &str) {
+        let error = Lock::parse("brick.lod.toml", text).expect_err("it is wrong");
+        assert!(error.message.contains(message), "{error}");
+        let span = error.labels.first().expect("it has a place").0.clone();
+        assert!(text[span.clone()].contains(label), "{span:?} {error}");
+        assert!(!error.notes.is_empty(), "{error}");
+    }
+
+    #[test]
+    fn errors_have_places() {
+        let good = lock().to_toml();
+        fails("format = 1\nsource = { file = \n", "cannot be read", "");
+        fails("format = 1000\nwhatever = true\n", "format 1000", "1000");
+        fails("format = 0\n", "format 0", "0");
+        fails(&good.replace("seed = ", "sead = "), "sead", "sead");
+        fails(
+            &good.replace("\"op-removal\"", "\"no-such\""),
+            "no pass `no-such`",
+            "no-such",
+        );
+        fails(
+            &good.replace("\"3dcccccd\"", "\"3dccccc\""),
+            "`3dccccc` is not",
+            "3dccccc",
+        );
+        fails(
+            &good.replace("\"3dcccccd\"", "\"+dcccccd\""),
+            "`+dcccccd` is not",
+            "+dcccccd",
+        );
+        fails(
+            &good.replace("autolod = 4.25", "autolod = 0.05"),
+            "autoLOD 0.05",
+            "0.05",
+        );
+        fails(
+            &good.replace("autolod = 0.1", "autolod = nan"),
+            "autoLOD NaN",
+            "nan",
+        );
+        fails(
+            &good.replace("\"uniform\"", "\"uniforms\""),
+            "uniforms",
+            "uniforms",
+        );
+    }
+
+    #[test]
+    fn figures_are_short() {
+        assert_eq!(figure(0.019_023_847), 0.01902);
+        assert_eq!(figure(12345.6), 12350.0);
+        assert_eq!(figure(0.0), 0.0);
+    }
+
+    #[test]
+    fn places_of_steps_are_found() {
+        let text = lock().to_toml();
+        let span = place(&text, 0, 1).expect("it is there");
+        assert!(text[span].contains("texture-removal"));
+    }
+}
