@@ -10,3 +10,14 @@ pub type Words = [u32; LANES];
 /// top left, top right, bottom left, bottom right.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mask(pub [u64; LANES / 64]);
+
+impl Mask {
+    /// The lanes that take part, in order.
+    pub fn lanes(self) -> impl Iterator<Item = usize> {
+        self.0.into_iter().enumerate().flat_map(|(i, word)| {
+            let some = |word: u64| (word != 0).then_some(word);
+            std::iter::successors(some(word), move |word| some(word & (word - 1)))
+                .map(move |word| i * 64 + word.trailing_zeros() as usize)
+        })
+    }
+}
