@@ -13,11 +13,20 @@ pub struct Mask(pub [u64; LANES / 64]);
 
 impl Mask {
     /// The lanes that take part, in order.
+    #[inline]
     pub fn lanes(self) -> impl Iterator<Item = usize> {
-        self.0.into_iter().enumerate().flat_map(|(i, word)| {
-            let some = |word: u64| (word != 0).then_some(word);
-            std::iter::successors(some(word), move |word| some(word & (word - 1)))
-                .map(move |word| i * 64 + word.trailing_zeros() as usize)
+        let mut words = self.0;
+        let mut i = 0;
+        std::iter::from_fn(move || {
+            while let Some(word) = words.get_mut(i) {
+                if *word != 0 {
+                    let lane = i * 64 + word.trailing_zeros() as usize;
+                    *word &= *word - 1;
+                    return Some(lane);
+                }
+                i += 1;
+            }
+            None
         })
     }
 }

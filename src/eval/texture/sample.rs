@@ -189,8 +189,8 @@ impl Texture {
                         }
                         (Dimension::D3, true) => {
                             let (x, y, z) = (x.taps(lane), y.taps(lane), z.taps(lane));
-                            let near = level.bilinear(z.first, x, y, &read);
-                            mix(near, level.bilinear(z.second, x, y, &read), z.weight)
+                            let near = level.bilinear(z.first, x, y, read);
+                            mix(near, level.bilinear(z.second, x, y, read), z.weight)
                         }
                         (Dimension::D3, false) => {
                             let [x, y, z] = [x, y, z].map(|axis| axis.first[lane] as usize);
@@ -274,57 +274,56 @@ impl Texture {
 
     /// The level of detail of each lane.
     fn lambda(&self, request: &Request, places: &Places) -> Floats {
-        let mut lambda = [0.0; LANES];
-        let get = |d: &[&Floats], lane: usize| [0, 1, 2].map(|i| d.get(i).map_or(0.0, |d| d[lane]));
         match request.detail {
-            Detail::Zero => {}
-            Detail::Exact(level) => lambda = *level,
-            Detail::Gradients { ddx, ddy } => {
-                for (lane, lambda) in lambda.iter_mut().enumerate() {
-                    let gradients = [get(ddx, lane), get(ddy, lane)];
-                    *lambda = self.detail(places.on_face(lane, gradients));
-                }
-            }
+            Detail::Zero => [0.0; LANES],
+            Detail::Exact(level) => *level,
+            Detail::Gradients { ddx, ddy } => self.detail(ddx, ddy, places),
             Detail::Implicit { bias } => {
-                for (quad, lambda) in lambda.chunks_exact_mut(4).enumerate() {
-                    let lane = quad * 4;
-                    let at = |lane: usize| get(request.coordinates, lane);
-                    let difference = |to: [f32; 3], from: [f32; 3]| {
-                        [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
-                    };
-                    let first = at(lane);
-                    let gradients = [
-                        difference(at(lane + 1), first),
-                        difference(at(lane + 2), first),
-                    ];
-                    if self.dimension == Dimension::Cube {
-                        // Each lane on its own face.
-                        for (i, lambda) in lambda.iter_mut().enumerate() {
-                            *lambda = self.detail(places.on_face(lane + i, gradients));
-                        }
-                    } else {
-                        lambda.fill(self.detail(gradients));
+                let mut gradients = [[[0.0; LANES]; 3]; 2];
+                for (axis, at) in request.coordinates.iter().take(3).enumerate() {
+                    let [x, y] = &mut gradients;
+                    let x = x[axis].as_chunks_mut::<4>().0;
+                    let y = y[axis].as_chunks_mut::<4>().0;
+                    for ((quad, x), y) in at.as_chunks::<4>().0.iter().zip(x).zip(y) {
+                        *x = [quad[1] - quad[0]; 4];
+                        *y = [quad[2] - quad[0]; 4];
                     }
                 }
+                let count = request.coordinates.len().min(3);
+                let [ddx, ddy] = gradients.each_ref().map(|g| g.each_ref());
+                let mut lambda = self.detail(&ddx[..count], &ddy[..count], places);
                 if let Some(bias) = bias {
                     for (lambda, bias) in lambda.iter_mut().zip(bias) {
                         *lambda += bias;
                     }
                 }
+                lambda
             }
         }
-        lambda
     }
 
-    /// The level of detail for gradients of normalised coordinates along x and y.
-    #[inline]
-    fn detail(&self, gradients: [[f32; 3]; 2]) -> f32 {
+    /// The level of detail for gradients of the coordinates along x and y.
+    fn detail(&self, ddx: &[&Floats], ddy: &[&Floats], places: &Places) -> Floats {
         let size = self.size(0).map(|n| n as f32);
-        let [x, y] = gradients.map(|d| {
-            let texels = [d[0] * size[0], d[1] * size[1], d[2] * size[2]];
-            texels[0] * texels[0] + texels[1] * texels[1] + texels[2] * texels[2]
-        });
-        0.5 * Real::log2(if x > y { x } else { y })
+        let squared = |gradients: &[&Floats]| {
+            let mut sum = [0.0; LANES];
+            for (gradient, size) in gradients.iter().zip(size) {
+                for (sum, gradient) in sum.iter_mut().zip(*gradient) {
+                    let texels = gradient * size;
+                    *sum += texels * texels;
+                }
+            }
+            sum
+        };
+        let [mut x, y] = match (&places.on_cube, ddx, ddy) {
+            (Some(cube), &[ax, ay, az], &[bx, by, bz]) => [[ax, ay, az], [bx, by, bz]]
+                .map(|gradients| squared(&cube.on_faces(gradients).each_ref())),
+            _ => [squared(ddx), squared(ddy)],
+        };
+        for (x, y) in x.iter_mut().zip(y) {
+            *x = 0.5 * Real::log2(if *x > y { *x } else { y });
+        }
+        x
     }
 }
 
@@ -334,8 +333,16 @@ struct Places {
     at: [Floats; 3],
     /// Layer, face or (for a volume) 0.
     plane: [u32; LANES],
-    /// For a cube, the direction as each lane's face sees it, see [`Face::project`].
-    on_cube: Option<Box<[(Face, [f32; 3]); LANES]>>,
+    /// For a cube, how the direction looks from each lane's face.
+    on_cube: Option<Box<OnCube>>,
+}
+
+/// Directions in the frames of the faces that they point at, see [`Face::project`].
+struct OnCube {
+    faces: [Face; LANES],
+    right: Floats,
+    down: Floats,
+    outwards: Floats,
 }
 
 impl Places {
@@ -345,31 +352,37 @@ impl Places {
             plane: [0; LANES],
             on_cube: None,
         };
-        let given = |i: usize| request.coordinates.get(i).copied();
         if let Some(layer) = request.layer {
             let last = texture.layers() as i32 - 1;
             for (plane, &layer) in places.plane.iter_mut().zip(layer) {
                 *plane = layer.max(0).min(last) as u32;
             }
         }
-        if texture.dimension == Dimension::Cube {
-            let zero = [0.0; LANES];
-            let [x, y, z] = [0, 1, 2].map(|i| given(i).unwrap_or(&zero));
-            let mut seen = Box::new([(Face::default(), [0.0; 3]); LANES]);
-            for lane in 0..LANES {
-                let direction = [x[lane], y[lane], z[lane]];
-                let face = Face::of(direction);
-                let [sc, tc, ma] = face.project(direction);
-                places.at[0][lane] = 0.5 * (sc / ma) + 0.5;
-                places.at[1][lane] = 0.5 * (tc / ma) + 0.5;
-                places.plane[lane] = places.plane[lane] * 6 + face.index();
-                seen[lane] = (face, [sc, tc, ma]);
+        match *request.coordinates {
+            [x, y, z] if texture.dimension == Dimension::Cube => {
+                let mut cube = Box::new(OnCube {
+                    faces: [Face::default(); LANES],
+                    right: [0.0; LANES],
+                    down: [0.0; LANES],
+                    outwards: [0.0; LANES],
+                });
+                for lane in 0..LANES {
+                    let direction = [x[lane], y[lane], z[lane]];
+                    let face = Face::of(direction);
+                    let [right, down, outwards] = face.project(direction);
+                    places.at[0][lane] = 0.5 * (right / outwards) + 0.5;
+                    places.at[1][lane] = 0.5 * (down / outwards) + 0.5;
+                    places.plane[lane] = places.plane[lane] * 6 + face.index();
+                    cube.faces[lane] = face;
+                    cube.right[lane] = right;
+                    cube.down[lane] = down;
+                    cube.outwards[lane] = outwards;
+                }
+                places.on_cube = Some(cube);
             }
-            places.on_cube = Some(seen);
-        } else {
-            for (i, at) in places.at.iter_mut().enumerate() {
-                if let Some(given) = given(i) {
-                    *at = *given;
+            _ => {
+                for (at, given) in places.at.iter_mut().zip(request.coordinates) {
+                    *at = **given;
                 }
             }
         }
@@ -383,23 +396,21 @@ impl Places {
         }
         places
     }
+}
 
-    /// On a cube, gradients of the direction as gradients of the coordinates on the lane's face.
-    fn on_face(&self, lane: usize, gradients: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
-        let Some(on_cube) = &self.on_cube else {
-            return gradients;
-        };
-        let (face, [sc, tc, ma]) = on_cube[lane];
-        // s = sc / (2 ma) + 1/2 by the quotient rule.
-        let scale = 0.5 / (ma * ma);
-        gradients.map(|d| {
-            let d = face.project(d);
-            [
-                scale * (d[0] * ma - sc * d[2]),
-                scale * (d[1] * ma - tc * d[2]),
-                0.0,
-            ]
-        })
+impl OnCube {
+    /// Gradients of the direction as gradients of the coordinates on each lane's face.
+    fn on_faces(&self, [x, y, z]: [&Floats; 3]) -> [Floats; 2] {
+        let mut out = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let [right, down, outwards] = self.faces[lane].project([x[lane], y[lane], z[lane]]);
+            let ma = self.outwards[lane];
+            // s = sc / (2 ma) + 1/2 by the quotient rule.
+            let scale = 0.5 / (ma * ma);
+            out[0][lane] = scale * (right * ma - self.right[lane] * outwards);
+            out[1][lane] = scale * (down * ma - self.down[lane] * outwards);
+        }
+        out
     }
 }
 
@@ -560,9 +571,9 @@ impl Axis {
     ) {
         /// Beyond this, a coordinate has no fraction that is worth keeping; what is clamped stays exact.
         const FAR: f32 = 2_097_152.0;
-        for lane in 0..LANES {
+        for (lane, &at) in at.iter().enumerate() {
             // NaN fails the comparison.
-            let x = in_texels(at[lane]);
+            let x = in_texels(at);
             let x = if x > -FAR { x } else { -FAR };
             let x = if x < FAR { x } else { FAR };
             let left = floor(x);
@@ -721,12 +732,14 @@ impl Face {
     /// A direction in the face's frame: to the right, down, and outwards.
     #[inline(always)]
     fn project(self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let s = self.sign;
-        match self.axis {
-            0 => [-z * s, -y, x * s],
-            1 => [x, z * s, y * s],
-            _ => [x * s, -y, z * s],
-        }
+        let (on_x, on_y) = (self.axis == 0, self.axis == 1);
+        // One choice after the other rather than a match: it vectorises.
+        let right = if on_x { -z } else { x };
+        let right = if on_y { right } else { right * self.sign };
+        let down = if on_y { z * self.sign } else { -y };
+        let outwards = if on_x { x } else { z };
+        let outwards = if on_y { y } else { outwards };
+        [right, down, outwards * self.sign]
     }
 }
 
