@@ -30,18 +30,36 @@ pub struct ValueFacts {
 }
 
 impl Facts {
-    /// The mean of a value that has `count` components.
+    /// The mean of values that have `count` components each, taken as one: each weighs as much as it
+    /// was seen. Those that were not seen are left out.
     ///
     /// # Errors
-    /// When the value was not seen, or only with infinite or undefined numbers.
-    pub fn mean(&self, id: &ValueId, count: usize) -> Result<&[f32], Declined> {
-        let facts = self
-            .values
-            .get(id)
+    /// When none was seen, or one only with infinite or undefined numbers.
+    pub fn mean<'a>(
+        &self,
+        ids: impl IntoIterator<Item = &'a ValueId>,
+        count: usize,
+    ) -> Result<Vec<f32>, Declined> {
+        let seen: Vec<&ValueFacts> = ids
+            .into_iter()
+            .filter_map(|id| self.values.get(id))
             .filter(|facts| facts.count > 0 && facts.mean.len() == count)
-            .ok_or_else(|| Declined("no sample of the scene computes it".into()))?;
-        if facts.mean.iter().all(|number| number.is_finite()) {
-            Ok(&facts.mean)
+            .collect();
+        let samples: f64 = seen.iter().map(|facts| facts.count as f64).sum();
+        let mean: Vec<f32> = match seen[..] {
+            [] => return Err(Declined("no sample of the scene computes it".into())),
+            [only] => only.mean.clone(),
+            _ => (0..count)
+                .map(|i| {
+                    let weighted = |facts: &&ValueFacts| {
+                        f64::from(facts.mean[i]) * (facts.count as f64 / samples)
+                    };
+                    seen.iter().map(weighted).sum::<f64>() as f32
+                })
+                .collect(),
+        };
+        if mean.iter().all(|number| number.is_finite()) {
+            Ok(mean)
         } else {
             Err(Declined("its mean over the samples is not finite".into()))
         }
@@ -113,7 +131,7 @@ mod tests {
     fn a_mean_needs_samples_and_finite_numbers() {
         let id = ValueId::from("fs_main.x");
         let mut facts = Facts::default();
-        assert!(facts.mean(&id, 1).is_err());
+        assert!(facts.mean([&id], 1).is_err());
         let seen = ValueFacts {
             count: 4,
             mean: vec![0.25],
@@ -121,18 +139,36 @@ mod tests {
             max: vec![1.0],
         };
         facts.values.insert(id.clone(), seen.clone());
-        assert_eq!(facts.mean(&id, 1), Ok(&[0.25][..]));
-        assert!(facts.mean(&id, 2).is_err(), "another count of components");
+        assert_eq!(facts.mean([&id], 1), Ok(vec![0.25]));
+        assert!(facts.mean([&id], 2).is_err(), "another count of components");
         let endless = ValueFacts {
             mean: vec![f32::INFINITY],
             ..seen.clone()
         };
         facts.values.insert(id.clone(), endless);
-        assert!(facts.mean(&id, 1).is_err());
+        assert!(facts.mean([&id], 1).is_err());
         facts
             .values
             .insert(id.clone(), ValueFacts { count: 0, ..seen });
-        assert!(facts.mean(&id, 1).is_err(), "never computed");
+        assert!(facts.mean([&id], 1).is_err(), "never computed");
+    }
+
+    #[test]
+    fn a_mean_over_several_weighs_them_by_their_samples() {
+        let ids: Vec<ValueId> = ["fs_main.x", "fs_main.y", "fs_main.z"]
+            .map(ValueId::from)
+            .into();
+        let mut facts = Facts::default();
+        for (id, (count, mean)) in ids.iter().zip([(1, 1.0), (3, 0.0), (0, 9.0)]) {
+            let seen = ValueFacts {
+                count,
+                mean: vec![mean],
+                ..ValueFacts::default()
+            };
+            facts.values.insert(id.clone(), seen);
+        }
+        assert_eq!(facts.mean(&ids, 1), Ok(vec![0.25]));
+        assert!(facts.mean(&ids[2..], 1).is_err());
     }
 
     #[test]

@@ -689,10 +689,12 @@ impl Reader<'_> {
         }
         for loop_ in 0..self.continued.len() {
             let own = || self.exits.iter().filter(|exit| exit.loop_ == loop_);
-            if !own().any(|exit| self.counts(exit)) {
-                for condition in own().flat_map(|exit| &exit.conditions) {
-                    mark(*condition, Decides::Loop);
-                }
+            // A counter suffices, and then it is all that has to stay.
+            let counter = own().find(|exit| self.counts(exit));
+            let stays =
+                own().filter(|exit| counter.is_none_or(|counter| std::ptr::eq(counter, *exit)));
+            for condition in stays.flat_map(|exit| &exit.conditions) {
+                mark(*condition, Decides::Loop);
             }
         }
         decides

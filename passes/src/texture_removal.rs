@@ -113,11 +113,7 @@ impl Pass for TextureRemoval {
         let Some(flow) = Flow::new(shader, STAGE) else {
             return Vec::new();
         };
-        let survey = Survey {
-            shader,
-            flow: &flow,
-            facts,
-        };
+        let survey = Survey { flow: &flow, facts };
         let mut found = Vec::new();
         for (site, _) in flow.function.expressions.iter() {
             if let Some(image) = image(&flow, site) {
@@ -260,7 +256,6 @@ fn removable(flow: &Flow, reads: &[Value], choice: Choice) -> Result<usize, Decl
 
 /// One listing of the candidates.
 struct Survey<'a> {
-    shader: &'a Shader,
     flow: &'a Flow<'a>,
     facts: &'a Facts,
 }
@@ -273,7 +268,7 @@ impl Survey<'_> {
         reads: &[Value],
         found: &mut Vec<Considered>,
     ) {
-        let name = texture.and_then(|t| self.shader.module().global_variables[t].name.as_deref());
+        let name = texture.and_then(|t| self.flow.module.global_variables[t].name.as_deref());
         let known = name.and_then(|name| self.facts.textures.get(name));
         let of_texture = if known.is_some_and(|texture| texture.is_flat()) {
             Choice::OnlyColour
@@ -286,7 +281,10 @@ impl Survey<'_> {
                     Declined("its texture has no image, so it may hold anything".into())
                 })?;
                 let mean = match choice {
-                    Choice::SeenMean => self.seen_mean(reads, count)?,
+                    Choice::SeenMean => {
+                        let ids = reads.iter().map(|read| self.flow.id(*read));
+                        self.facts.mean(ids, count)?
+                    }
                     _ => known.mean_at_level()?[..count].to_vec(),
                 };
                 follow(self.flow, reads, &mean)?;
@@ -298,7 +296,7 @@ impl Survey<'_> {
             };
             let candidate = Candidate {
                 pass: TextureRemoval.name().into(),
-                site: self.shader.id(STAGE, site).clone(),
+                site: self.flow.id(site).clone(),
                 choice: choice.word().into(),
                 value,
             };
@@ -306,33 +304,6 @@ impl Survey<'_> {
                 candidate,
                 declined,
             });
-        }
-    }
-
-    /// The mean of what reads returned, each weighted by how often it was seen.
-    fn seen_mean(&self, reads: &[Value], count: usize) -> Result<Vec<f32>, Declined> {
-        let mut sum = vec![0.0f64; count];
-        let mut samples = 0u64;
-        let mut unseen = None;
-        for read in reads {
-            let id = self.shader.id(STAGE, *read);
-            match self.facts.mean(id, count) {
-                Ok(mean) => {
-                    let weight = self.facts.values[id].count;
-                    samples += weight;
-                    for (sum, mean) in sum.iter_mut().zip(mean) {
-                        *sum += f64::from(*mean) * weight as f64;
-                    }
-                }
-                Err(declined) => unseen = Some(declined),
-            }
-        }
-        match unseen {
-            Some(declined) if samples == 0 => Err(declined),
-            _ => Ok(sum
-                .iter()
-                .map(|sum| (sum / samples as f64) as f32)
-                .collect()),
         }
     }
 }

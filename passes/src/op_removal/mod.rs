@@ -1,0 +1,416 @@
+//! op-removal: an operation goes, and one of its operands or its mean takes its place.
+//!
+//! Precondition. The site is a value of the fragment stage, mostly a float, that nothing but the picture depends
+//! on. To keep an operand, the site is an operator or built-in function, and the operand has the site's
+//! own type; to take a side, it is the condition of an `if`; for a mean, the site is such an operation, a merged local variable, a vector made of
+//! parts, or an input, and the samples saw it.
+//!
+//! Effect. `keep <operand>`: the site's users use that operand. `mean`: they use the value's mean over
+//! the samples, a constant that the candidate carries. `without`: every operation that uses the site
+//! keeps its other operand, as if the site were the zero of a sum, the one of a product, or the side of
+//! a mix that is not chosen; so a costly value that several operations share dies at once, where each
+//! removal alone would save nothing. `accept` and `reject`, at the condition of an `if`: that side is
+//! taken always, and the test and the other side go.
+//!
+//! Error. Not known here: it is measured. A mean is the constant with the least squared error in the
+//! value itself, which is why the constant operand of an operation is not offered.
+//!
+//! Declines.
+//! - What decides when a loop ends (unless a counter of integers ends it anyway), a built-in output
+//!   such as the depth, or what is written to memory. The condition of a `discard` may change: the
+//!   picture shows it.
+//! - What would have a texture read at the same coordinate by every fragment: that is texture-removal,
+//!   done the slow way.
+//! - A guard, that is `max`, `min`, `clamp`, `saturate` or `abs` on the way to a division, root,
+//!   logarithm, power or `normalize`, and a constant added right before one, unless the samples stay
+//!   away from its limit by an eighth of the range seen and of the limit, below by the limit itself.
+//!   Samples that were not taken must not meet a hole that the guard covered. This needs facts, so it
+//!   is decided when candidates are listed, not when they are replayed.
+//! - A side of an `if` that has an operation with a hole, unless all samples took that side: the test
+//!   may be there for the hole. A side that always discards.
+//! - `mean` where it is dominated: the only user is an operation on the value and constants, whose own
+//!   mean is cheaper and no worse.
+//! - `without` where an operation has no such operand, or there is only one operation.
+//!
+//! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail",
+//! 2003, section 3; Fabio Pellacini, "User-Configurable Automatic Shader Simplification", 2005,
+//! section 3; Pitchaya Sitthi-amorn, Nicholas Modly, Westley Weimer, Jason Lawrence, "Genetic
+//! Programming for Shader Simplification", 2011, section 4.
+
+mod survey;
+
+use crate::edit::{Edit, New};
+use crate::flow::{Flow, Value};
+use crate::operands::{self, User};
+use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
+use crate::shader::{Shader, Stage};
+use crate::{Facts, constants};
+use naga::{
+    BinaryOperator as Op, Binding, Block, Expression, Literal, MathFunction as Math, Statement,
+    UnaryOperator,
+};
+
+/// The stages whose operations are removed. The other passes' errors are those of fragments too.
+const STAGES: [Stage; 1] = [Stage::Fragment];
+
+/// The pass.
+pub struct OpRemoval;
+
+/// What is done at a site: the only place where the words of this pass are read.
+enum Choice<'a> {
+    /// The users use an operand, named by its path.
+    Keep(&'a str),
+    /// The users use the baked mean.
+    Mean,
+    /// The users do without it.
+    Without,
+    /// Every `if` on the site, a truth value, takes this side.
+    Take(bool),
+}
+
+impl<'a> Choice<'a> {
+    fn parse(choice: &'a str) -> Result<Self, Declined> {
+        match choice.split_once(' ') {
+            Some(("keep", path)) => Ok(Self::Keep(path)),
+            None if choice == "mean" => Ok(Self::Mean),
+            None if choice == "without" => Ok(Self::Without),
+            None if choice == "accept" => Ok(Self::Take(true)),
+            None if choice == "reject" => Ok(Self::Take(false)),
+            _ => Err(Declined(format!("op-removal has no choice `{choice}`"))),
+        }
+    }
+}
+
+impl Pass for OpRemoval {
+    fn name(&self) -> &'static str {
+        "op-removal"
+    }
+
+    fn summary(&self) -> &'static str {
+        "an operation goes; one of its operands, or its mean, takes its place"
+    }
+
+    fn class(&self, _: &Candidate) -> Class {
+        Class::Lossy
+    }
+
+    fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered> {
+        let mut found = Vec::new();
+        for stage in STAGES {
+            if let Some(flow) = Flow::new(shader, stage) {
+                survey::Survey::new(&flow, facts).list(&mut found);
+            }
+        }
+        found
+    }
+
+    fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
+        plan(shader, candidate).map(drop)
+    }
+
+    fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader {
+        match plan(shader, candidate) {
+            Ok((stage, changes)) => {
+                let mut edit = Edit::new(shader, stage);
+                for change in changes {
+                    match change {
+                        Change::Value(value, new) => edit.replace(value, new),
+                        Change::Condition(statement, condition, side) => {
+                            let path = format!("{}.{}", candidate.site.path(), candidate.choice);
+                            let side = Expression::Literal(Literal::Bool(side));
+                            let side = New::Value(edit.add(path, side));
+                            edit.replace_operand(User::Statement(statement), condition, side);
+                        }
+                    }
+                }
+                edit.finish()
+            }
+            Err(declined) => panic!("{candidate} was applied, but {declined}"),
+        }
+    }
+}
+
+/// A part of what a candidate does.
+#[derive(Debug)]
+enum Change {
+    /// All users of a value use another.
+    Value(Value, New),
+    /// The `if` statement of this number takes one side.
+    Condition(usize, Value, bool),
+}
+
+/// What a candidate replaces by what.
+fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<Change>), Declined> {
+    let choice = Choice::parse(&candidate.choice)?;
+    let (stage, site) = shader
+        .find(&candidate.site)
+        .ok_or_else(|| Declined(format!("there is no value `{}`", candidate.site.path())))?;
+    let flow = STAGES
+        .contains(&stage)
+        .then(|| Flow::new(shader, stage))
+        .flatten()
+        .ok_or_else(|| Declined("only operations of the fragment stage are removed".into()))?;
+    let changes = match choice {
+        Choice::Keep(path) => {
+            may_change(&flow, site)?;
+            let kept = own_operands(&flow, site)
+                .into_iter()
+                .find(|operand| flow.id(*operand).path() == path)
+                .ok_or_else(|| {
+                    let site = candidate.site.path();
+                    Declined(format!(
+                        "`{path}` is no operand of `{site}` that has its type"
+                    ))
+                })?;
+            if flow.is_constant(kept) {
+                return Err(Declined(
+                    "a constant is not kept: the mean is a better one".into(),
+                ));
+            }
+            vec![Change::Value(site, New::Value(kept))]
+        }
+        Choice::Mean => {
+            let count = mean_components(&flow, site).ok_or_else(|| {
+                Declined("it is no operation, merged variable or input of f32".into())
+            })?;
+            let numbers = candidate.baked(count)?;
+            let sites = all_of(&flow, site);
+            sites.iter().try_for_each(|site| may_change(&flow, *site))?;
+            follow(&flow, &sites, &numbers)?;
+            sites
+                .into_iter()
+                .map(|site| Change::Value(site, New::Numbers(numbers.clone())))
+                .collect()
+        }
+        Choice::Without => without(&flow, site)?
+            .into_iter()
+            .map(|(user, kept)| Change::Value(user, New::Value(kept)))
+            .collect(),
+        Choice::Take(side) => take(&flow, site, &ifs(&flow), side)?
+            .iter()
+            .map(|branch| Change::Condition(branch.statement, site, side))
+            .collect(),
+    };
+    Ok((stage, changes))
+}
+
+/// Declines what must stay as it is.
+fn may_change(flow: &Flow, value: Value) -> Result<(), Declined> {
+    match flow.decides(value) {
+        Some(why) => Err(Declined(why.to_string())),
+        None => Ok(()),
+    }
+}
+
+/// The operands of an operation that have its own type, each once: those that can take its place.
+/// None for what is no operator or built-in function on floats.
+fn own_operands(flow: &Flow, site: Value) -> Vec<Value> {
+    let expression = &flow.function.expressions[site];
+    let is_operation = match expression {
+        Expression::Unary { op, .. } => *op == UnaryOperator::Negate,
+        Expression::Binary { .. } | Expression::Select { .. } | Expression::Math { .. } => true,
+        _ => false,
+    };
+    let mut own = Vec::new();
+    if is_operation && flow.is_float(site) {
+        let inner = flow.inner(site);
+        operands::each(expression, |operand| {
+            if flow.inner(operand) == inner && !own.contains(&operand) {
+                own.push(operand);
+            }
+        });
+    }
+    own
+}
+
+/// How many components the mean of a value would have; `None` when it can have none.
+fn mean_components(flow: &Flow, site: Value) -> Option<usize> {
+    let count = flow.floats(site)?;
+    let can = match flow.function.expressions[site] {
+        Expression::Unary { .. }
+        | Expression::Binary { .. }
+        | Expression::Select { .. }
+        | Expression::Math { .. }
+        | Expression::Derivative { .. }
+        | Expression::As { .. } => true,
+        // Made of one part, it says the same as the part, less plainly.
+        Expression::Compose { ref components, .. } => {
+            let mut parts = components.iter().filter(|part| !flow.is_constant(**part));
+            let first = parts.next();
+            parts.any(|part| Some(part) != first)
+        }
+        Expression::Load { pointer } => flow.local(pointer).is_some(),
+        _ => matches!(flow.input(site), Some(Binding::Location { .. })),
+    };
+    (can && !flow.is_constant(site)).then_some(count)
+}
+
+/// A value, or for an input every value that is the same input: a shader may take it apart in several
+/// branches, and it is spared only when none does.
+fn all_of(flow: &Flow, site: Value) -> Vec<Value> {
+    if flow.input(site).is_none() {
+        return vec![site];
+    }
+    let wanted = &flow.function.expressions[site];
+    let values = flow.function.expressions.iter();
+    values
+        .filter(|(_, expression)| *expression == wanted)
+        .map(|(value, _)| value)
+        .collect()
+}
+
+/// Declines a constant that an operation on the sites cannot take.
+fn follow(flow: &Flow, sites: &[Value], numbers: &[f32]) -> Result<(), Declined> {
+    let become_constant: Vec<_> = sites.iter().map(|site| (*site, numbers)).collect();
+    constants::follow(flow, &become_constant)
+}
+
+/// What each operation that uses `site` keeps when it does without it.
+///
+/// Parts of the site (a swizzle, a component, a splat) are followed to the operations that use them.
+fn without(flow: &Flow, site: Value) -> Result<Vec<(Value, Value)>, Declined> {
+    let mut kept: Vec<(Value, Value)> = Vec::new();
+    let mut parts = vec![site];
+    while let Some(part) = parts.pop() {
+        if flow.is_stated(part) {
+            return Err(Declined("a statement uses it".into()));
+        }
+        for user in flow.users(part) {
+            match flow.function.expressions[user] {
+                Expression::Swizzle { .. }
+                | Expression::AccessIndex { .. }
+                | Expression::Splat { .. } => parts.push(user),
+                _ => {
+                    may_change(flow, user)?;
+                    let other = other_operand(flow, user, part).ok_or_else(|| {
+                        Declined("an operation on it has nothing else to keep".into())
+                    })?;
+                    kept.push((user, other));
+                }
+            }
+        }
+    }
+    kept.sort();
+    kept.dedup();
+    if kept.len() < 2 {
+        return Err(Declined("fewer than two operations use it".into()));
+    }
+    if kept.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+        return Err(Declined("an operation uses it twice".into()));
+    }
+    // An operation may keep another one that goes as well.
+    let last = |mut value: Value| {
+        while let Ok(i) = kept.binary_search_by_key(&value, |(user, _)| *user) {
+            value = kept[i].1;
+        }
+        value
+    };
+    Ok(kept
+        .iter()
+        .map(|(user, other)| (*user, last(*other)))
+        .collect())
+}
+
+/// The operand that an operation comes down to when `gone` is its neutral element.
+fn other_operand(flow: &Flow, user: Value, gone: Value) -> Option<Value> {
+    let other = match flow.function.expressions[user] {
+        Expression::Binary { op, left, right } => match op {
+            Op::Add | Op::Multiply if left == gone => right,
+            Op::Add | Op::Multiply | Op::Subtract | Op::Divide if right == gone => left,
+            _ => return None,
+        },
+        Expression::Select {
+            condition,
+            accept,
+            reject,
+        } => match gone {
+            _ if condition == gone => return None,
+            _ if accept == gone => reject,
+            _ => accept,
+        },
+        Expression::Math {
+            fun,
+            arg,
+            arg1: Some(arg1),
+            arg2,
+            ..
+        } => match (fun, arg2) {
+            (Math::Min | Math::Max | Math::Mix, _) if arg == gone => arg1,
+            (Math::Min | Math::Max | Math::Mix | Math::Pow, _) if arg1 == gone => arg,
+            (Math::Mix, Some(weight)) if weight == gone => arg,
+            (Math::Fma, Some(sum)) if sum != gone => sum,
+            _ => return None,
+        },
+        _ => return None,
+    };
+    let fits = other != gone
+        && flow.is_float(user)
+        && flow.inner(other) == flow.inner(user)
+        && !flow.is_constant(other);
+    fits.then_some(other)
+}
+
+/// An `if` statement.
+#[derive(Clone, Copy)]
+struct If<'a> {
+    /// Its number in the order of [`operands::walk`].
+    statement: usize,
+    condition: Value,
+    accept: &'a Block,
+    reject: &'a Block,
+}
+
+impl<'a> If<'a> {
+    fn side(&self, side: bool) -> &'a Block {
+        if side { self.accept } else { self.reject }
+    }
+}
+
+/// The `if` statements of a function, in order.
+fn ifs<'a>(flow: &Flow<'a>) -> Vec<If<'a>> {
+    let mut found = Vec::new();
+    let mut number = 0;
+    operands::walk(&flow.function.body, &mut |statement| {
+        if let Statement::If {
+            condition,
+            accept,
+            reject,
+        } = statement
+        {
+            found.push(If {
+                statement: number,
+                condition: *condition,
+                accept,
+                reject,
+            });
+        }
+        number += 1;
+    });
+    found
+}
+
+/// The `if` statements on a condition, when all of them may take one side always.
+fn take<'a>(
+    flow: &Flow,
+    condition: Value,
+    ifs: &[If<'a>],
+    side: bool,
+) -> Result<Vec<If<'a>>, Declined> {
+    may_change(flow, condition)?;
+    if flow.is_constant(condition) {
+        return Err(Declined("the condition is constant".into()));
+    }
+    let on_it = ifs.iter().filter(|branch| branch.condition == condition);
+    let on_it: Vec<If> = on_it.copied().collect();
+    if on_it.is_empty() {
+        return Err(Declined("no `if` asks for it".into()));
+    }
+    let discards = |branch: &If| {
+        let mut statements = branch.side(side).iter();
+        statements.any(|statement| matches!(statement, Statement::Kill))
+    };
+    if on_it.iter().any(discards) {
+        return Err(Declined("every fragment would be discarded".into()));
+    }
+    Ok(on_it)
+}
