@@ -77,7 +77,8 @@ fn tint(test: &str, texts: &[(String, String)]) -> Option<Vec<String>> {
         stdout,
         String::from_utf8_lossy(&output.stderr),
     );
-    Some(lines)
+    let errors = lines.iter().filter_map(|line| line.strip_prefix("error "));
+    Some(errors.map(str::to_owned).collect())
 }
 
 /// Shows a named SPIR-V module to `spirv-val`. Its complaint, empty if there is none; `None` where it is not installed.
@@ -109,16 +110,23 @@ fn validated(name: &str, text: &str) -> (naga::Module, naga::valid::ModuleInfo) 
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(text, name)));
     let info = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::default(),
+        naga::valid::Capabilities::all(),
     )
     .validate(&module)
     .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(text, name)));
     (module, info)
 }
 
-/// The SPIR-V of a valid module.
+/// The SPIR-V of a valid module, with its overrides at their defaults.
 fn spirv(module: &naga::Module, info: &naga::valid::ModuleInfo) -> Vec<u32> {
-    naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), None)
+    let (module, info) = naga::back::pipeline_constants::process_overrides(
+        module,
+        info,
+        None,
+        &naga::back::PipelineConstants::default(),
+    )
+    .expect("every override has a default");
+    naga::back::spv::write_vec(&module, &info, &naga::back::spv::Options::default(), None)
         .expect("naga writes SPIR-V of what it validated")
 }
 
@@ -156,16 +164,26 @@ fn spirv_val_refuses_a_module_without_a_memory_model() {
     }
 }
 
-#[test]
-fn judges_accept_the_materials() {
-    let texts = shaders("materials");
+/// Shows every shader of a folder to naga, Tint and `spirv-val`.
+fn judged(folder: &str) {
+    let texts = shaders(folder);
     for (name, text) in &texts {
         let (module, info) = validated(name, text);
-        if let Some(complaint) = spirv_val("materials", name, &spirv(&module, &info)) {
+        if let Some(complaint) = spirv_val(folder, name, &spirv(&module, &info)) {
             assert!(complaint.is_empty(), "{complaint}");
         }
     }
-    if let Some(errors) = tint("tint_materials", &texts) {
+    if let Some(errors) = tint(&format!("tint_{folder}"), &texts) {
         assert!(errors.is_empty(), "{errors:#?}");
     }
+}
+
+#[test]
+fn judges_accept_the_materials() {
+    judged("materials");
+}
+
+#[test]
+fn judges_accept_the_adversarial_shaders() {
+    judged("shaders");
 }

@@ -1,7 +1,7 @@
 //! Draws a frame: rasterises once, shades as often as there are variants.
 
 use super::image::Picture;
-use super::lane::{LANES, Mask, Words};
+use super::lane::{LANES, Words};
 use super::machine::{Bindings, Machine, Profile};
 use super::program::{Program, Slot};
 use super::raster::{Block, Coverage, Frame, rasterize};
@@ -93,7 +93,7 @@ pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
         Vec::new()
     };
     for block in &coverage.blocks {
-        for (i, lane) in lanes(block.covered).enumerate() {
+        for (i, lane) in block.covered.lanes().enumerate() {
             let fragment = block.first + i;
             if !shading.alive[fragment] {
                 continue;
@@ -222,7 +222,7 @@ impl Job<'_> {
                 }
             };
             let kept = machine.run(inputs, block.active, block.covered, &mut outputs);
-            for lane in lanes(block.covered) {
+            for lane in block.covered.lanes() {
                 let mut colour = [0.0, 0.0, 0.0, 1.0];
                 for &(output, component, kind) in &interface.colour {
                     let word = outputs[output][lane];
@@ -265,13 +265,4 @@ fn merge(mut first: Profile, second: Profile) -> Profile {
         }
     }
     first
-}
-
-/// The lanes of a mask, in order.
-fn lanes(mask: Mask) -> impl Iterator<Item = usize> {
-    mask.0.into_iter().enumerate().flat_map(|(i, word)| {
-        let some = |word: u64| (word != 0).then_some(word);
-        std::iter::successors(some(word), move |word| some(word & (word - 1)))
-            .map(move |word| i * 64 + word.trailing_zeros() as usize)
-    })
 }

@@ -10,3 +10,23 @@ pub type Words = [u32; LANES];
 /// top left, top right, bottom left, bottom right.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mask(pub [u64; LANES / 64]);
+
+impl Mask {
+    /// The lanes that take part, in order.
+    #[inline]
+    pub fn lanes(self) -> impl Iterator<Item = usize> {
+        let mut words = self.0;
+        let mut i = 0;
+        std::iter::from_fn(move || {
+            while let Some(word) = words.get_mut(i) {
+                if *word != 0 {
+                    let lane = i * 64 + word.trailing_zeros() as usize;
+                    *word &= *word - 1;
+                    return Some(lane);
+                }
+                i += 1;
+            }
+            None
+        })
+    }
+}

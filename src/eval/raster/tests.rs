@@ -97,11 +97,10 @@ fn at(x: f32, y: f32, z: f32, w: f32) -> [f32; 4] {
 
 /// The covered lanes of all blocks, in order: block and lane.
 fn fragments(coverage: &Coverage) -> impl Iterator<Item = (&Block, usize)> {
-    coverage.blocks.iter().flat_map(|block| {
-        (0..LANES)
-            .filter(|lane| block.covered.0[lane / 64] >> (lane % 64) & 1 == 1)
-            .map(move |lane| (block, lane))
-    })
+    coverage
+        .blocks
+        .iter()
+        .flat_map(|block| block.covered.lanes().map(move |lane| (block, lane)))
 }
 
 /// The covered pixels as a picture of dots and crosses.

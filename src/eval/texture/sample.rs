@@ -10,6 +10,7 @@
 
 use super::{Comparison, Dimension, Level, Sampler, Texture, Wrap};
 use crate::eval::lane::{LANES, Mask};
+use lodc_passes::semantics::Real;
 
 /// One float a lane.
 pub type Floats = [f32; LANES];
@@ -95,44 +96,25 @@ impl Comparison {
 impl Texture {
     /// Samples for the lanes of `mask`; the other lanes of `out` stay as they are.
     pub fn sample(&self, sampler: &Sampler, request: &Request, mask: Mask, out: &mut [Floats; 4]) {
-        for quad in 0..LANES / 4 {
-            let bits = mask.0[quad / 16] >> (quad % 16 * 4) & 15;
-            if bits == 0 {
-                continue;
+        let places = Places::new(self, request);
+        match (request.gather, request.reference) {
+            (Some(component), None) => {
+                let read = |_, texel: [f32; 4]| texel[component & 3];
+                self.gather(sampler, request, &places, mask, read, out);
             }
-            let gradients = match request.detail {
-                Detail::Implicit { .. } => quad_gradients(request.coordinates, quad),
-                _ => Gradients::default(),
-            };
-            // Cubes project gradients on each lane's own face, so nothing is shared there.
-            let shared = match request.detail {
-                Detail::Implicit { bias } if self.dimension != Dimension::Cube => {
-                    Some(self.detail(&gradients, bias.is_some()))
-                }
-                _ => None,
-            };
-            for i in (0..4).filter(|i| bits >> i & 1 == 1) {
-                let lane = quad * 4 + i;
-                let place = self.place(request, lane);
-                let value = match request.gather {
-                    Some(component) => self.gather(sampler, request, &place, component, lane),
-                    None => {
-                        let lambda = self.lambda(request, &place, &gradients, shared, lane);
-                        match request.reference {
-                            None => self.filter(sampler, &place, lambda, request.offset, |t| t),
-                            Some(reference) => {
-                                let compare = |texel: [f32; 4]| {
-                                    let holds = sampler.comparison.holds(reference[lane], texel[0]);
-                                    [holds, 0.0, 0.0, 0.0]
-                                };
-                                self.filter(sampler, &place, lambda, request.offset, compare)
-                            }
-                        }
-                    }
+            (Some(_), Some(reference)) => {
+                let read = |lane: usize, texel: [f32; 4]| {
+                    sampler.comparison.holds(reference[lane], texel[0])
                 };
-                for (out, value) in out.iter_mut().zip(value) {
-                    out[lane] = value;
-                }
+                self.gather(sampler, request, &places, mask, read, out);
+            }
+            (None, None) => self.filter(sampler, request, &places, mask, |_, t| t, out),
+            (None, Some(reference)) => {
+                let read = |lane: usize, texel: [f32; 4]| {
+                    let holds = sampler.comparison.holds(reference[lane], texel[0]);
+                    [holds, 0.0, 0.0, 0.0]
+                };
+                self.filter(sampler, request, &places, mask, read, out);
             }
         }
     }
@@ -148,7 +130,7 @@ impl Texture {
         out: &mut [Floats; 4],
     ) {
         let clamp = |value: i32, count: usize| (value.max(0) as usize).min(count - 1);
-        for lane in (0..LANES).filter(|lane| mask.0[lane / 64] >> (lane % 64) & 1 == 1) {
+        for lane in mask.lanes() {
             let level = level.map_or(0, |level| clamp(level[lane], self.levels.len()));
             let level = &self.levels[level];
             let axis = |axis: usize, count: u32| {
@@ -160,438 +142,605 @@ impl Texture {
                 (_, Some(layer)) => clamp(layer[lane], level.layers as usize),
                 (_, None) => 0,
             };
-            let texel = level.texel(plane, x, y);
-            for (out, value) in out.iter_mut().zip(texel) {
-                out[lane] = value;
-            }
+            store(out, lane, level.texel(plane, x, y));
         }
     }
 
-    /// Where a lane samples: which plane, and where on it.
-    fn place(&self, request: &Request, lane: usize) -> Place {
-        let base = &self.levels[0];
-        let get = |i: usize| request.coordinates.get(i).map(|c| c[lane]);
-        let layer = |count: u32| {
-            request
-                .layer
-                .map_or(0, |l| l[lane].max(0).min(count as i32 - 1) as usize)
-        };
-        let mut place = match self.dimension {
-            Dimension::D2 => Place {
-                plane: layer(base.layers),
-                at: [get(0).unwrap_or(0.5), get(1).unwrap_or(0.5), 0.5],
-                projected: [0.0; 3],
-            },
-            Dimension::D3 => Place {
-                plane: 0,
-                at: [0, 1, 2].map(|i| get(i).unwrap_or(0.5)),
-                projected: [0.0; 3],
-            },
-            Dimension::Cube => {
-                let direction = [0, 1, 2].map(|i| get(i).unwrap_or(0.0));
-                let (face, s, t) = cube_face(direction);
-                Place {
-                    plane: layer(base.layers / 6) * 6 + face,
-                    at: [s, t, 0.5],
-                    projected: project(face, direction),
-                }
-            }
-        };
-        if request.clamp_to_edge {
-            for (at, size) in place.at.iter_mut().zip(self.size(0)) {
-                let half = 0.5 / size as f32;
-                *at = at.max(half).min(1.0 - half);
-            }
-        }
-        place
-    }
-
-    /// The level of detail of a lane. Only its sign counts when there is one level.
-    fn lambda(
-        &self,
-        request: &Request,
-        place: &Place,
-        quad: &Gradients,
-        shared: Option<f32>,
-        lane: usize,
-    ) -> f32 {
-        let cube = self.dimension == Dimension::Cube;
-        match request.detail {
-            Detail::Zero => 0.0,
-            Detail::Exact(level) => level[lane],
-            Detail::Implicit { bias } => {
-                let lambda =
-                    shared.unwrap_or_else(|| self.detail(&quad.on_face(place), bias.is_some()));
-                bias.map_or(lambda, |bias| lambda + bias[lane])
-            }
-            Detail::Gradients { ddx, ddy } => {
-                let get = |d: &[&Floats]| [0, 1, 2].map(|i| d.get(i).map_or(0.0, |d| d[lane]));
-                let own = Gradients {
-                    x: get(ddx),
-                    y: get(ddy),
-                };
-                self.detail(&if cube { own.on_face(place) } else { own }, false)
-            }
-        }
-    }
-
-    /// The level of detail for gradients. Unless it must be exact because a bias is to be added,
-    /// anything up to 0 is 0, and with one level anything above is 1.
-    fn detail(&self, gradients: &Gradients, exact: bool) -> f32 {
-        let size = self.size(0).map(|n| n as f32);
-        let squared = |d: &[f32; 3]| {
-            let texels = [d[0] * size[0], d[1] * size[1], d[2] * size[2]];
-            texels[0] * texels[0] + texels[1] * texels[1] + texels[2] * texels[2]
-        };
-        let (x, y) = (squared(&gradients.x), squared(&gradients.y));
-        let longest = if x > y { x } else { y };
-        if !exact && longest <= 1.0 {
-            0.0
-        } else if !exact && self.levels.len() == 1 {
-            1.0
-        } else {
-            0.5 * libm::log2f(longest)
-        }
-    }
-
-    /// One or two MIP levels, each filtered over what `read` makes of its texels.
+    /// One or two MIP levels a lane, each filtered over what `read` makes of its texels.
+    ///
+    /// Level by level: the arithmetic of the coordinates runs over all lanes at once, in loops that
+    /// vectorise; then each lane reads its texels. A block mostly needs one or two levels.
     fn filter(
         &self,
         sampler: &Sampler,
-        place: &Place,
-        lambda: f32,
-        offset: [i32; 3],
-        read: impl Fn([f32; 4]) -> [f32; 4],
-    ) -> [f32; 4] {
-        let magnified = lambda.is_nan() || lambda <= 0.0;
-        let linear = if magnified {
-            sampler.linear_magnification
-        } else {
-            sampler.linear_minification
+        request: &Request,
+        places: &Places,
+        mask: Mask,
+        read: impl Fn(usize, [f32; 4]) -> [f32; 4],
+        out: &mut [Floats; 4],
+    ) {
+        let lambda = self.lambda(request, places);
+        let choice = Choice::new(&lambda, sampler, self.levels.len() - 1);
+        let Some((finest, coarsest)) = choice.range(mask) else {
+            return;
         };
-        let last = self.levels.len() - 1;
-        let (fine, part) = if magnified {
-            (0, 0.0)
-        } else {
-            let lambda = lambda.min(last as f32);
-            (lambda as usize, lambda - (lambda as usize) as f32)
-        };
-        let of_level = |level: usize| {
-            let level = &self.levels[level];
-            match (self.dimension, linear) {
-                (Dimension::D3, _) => level.volume(sampler, place, offset, linear, &read),
-                (Dimension::Cube, true) => level.bilinear_cube(place, &read),
-                (Dimension::D2, true) => level.bilinear(sampler, place, offset, &read),
-                (Dimension::Cube, false) => {
-                    level.nearest([Wrap::ClampToEdge; 3], place, offset, &read)
+        for (i, level) in self.levels[finest..=coarsest].iter().enumerate() {
+            let i = (finest + i) as i32;
+            for linear in [false, true] {
+                if linear != sampler.linear_magnification && linear != sampler.linear_minification {
+                    continue;
                 }
-                (Dimension::D2, false) => level.nearest(sampler.wrap, place, offset, &read),
+                let axes = self.axes(level, sampler, request.offset, places, linear);
+                for lane in mask.lanes() {
+                    let fine = choice.fine[lane] == i;
+                    let coarse = choice.fine[lane] + 1 == i && choice.part[lane] > 0.0;
+                    if !fine && !coarse || choice.linear[lane] != linear {
+                        continue;
+                    }
+                    let read = |texel| read(lane, texel);
+                    let plane = places.plane[lane] as usize;
+                    let [x, y, z] = &axes;
+                    let value = match (self.dimension, linear) {
+                        (Dimension::D2, true) => {
+                            level.bilinear(plane, x.taps(lane), y.taps(lane), read)
+                        }
+                        (Dimension::Cube, true) => {
+                            level.bilinear_cube(plane, x.taps(lane), y.taps(lane), read)
+                        }
+                        (Dimension::D3, true) => {
+                            let (x, y, z) = (x.taps(lane), y.taps(lane), z.taps(lane));
+                            let near = level.bilinear(z.first, x, y, read);
+                            mix(near, level.bilinear(z.second, x, y, read), z.weight)
+                        }
+                        (Dimension::D3, false) => {
+                            let [x, y, z] = [x, y, z].map(|axis| axis.first[lane] as usize);
+                            read(level.texel(z, x, y))
+                        }
+                        (_, false) => {
+                            let [x, y] = [x, y].map(|axis| axis.first[lane] as usize);
+                            read(level.texel(plane, x, y))
+                        }
+                    };
+                    let value = if fine {
+                        value
+                    } else {
+                        let finer = [0, 1, 2, 3].map(|c| out[c][lane]);
+                        mix(finer, value, choice.part[lane])
+                    };
+                    store(out, lane, value);
+                }
             }
-        };
-        if part == 0.0 {
-            of_level(fine)
-        } else if sampler.linear_mip {
-            mix(of_level(fine), of_level(fine + 1), part)
-        } else {
-            of_level(fine + usize::from(part > 0.5))
         }
     }
 
-    /// One component of the four texels of a bilinear sample.
+    /// What `read` makes of the four texels of a bilinear sample of the finest level.
     fn gather(
         &self,
         sampler: &Sampler,
         request: &Request,
-        place: &Place,
-        component: usize,
-        lane: usize,
-    ) -> [f32; 4] {
+        places: &Places,
+        mask: Mask,
+        read: impl Fn(usize, [f32; 4]) -> f32,
+        out: &mut [Floats; 4],
+    ) {
         let level = &self.levels[0];
-        let read = |texel: [f32; 4]| match request.reference {
-            None => texel[component & 3],
-            Some(reference) => sampler.comparison.holds(reference[lane], texel[0]),
+        let [x, y, _] = &self.axes(level, sampler, request.offset, places, true);
+        for lane in mask.lanes() {
+            let (x, y) = (x.taps(lane), y.taps(lane));
+            let plane = places.plane[lane] as usize;
+            let four = [
+                (x.first, y.second),
+                (x.second, y.second),
+                (x.second, y.first),
+                (x.first, y.first),
+            ];
+            let value = four.map(|(x, y)| {
+                let texel = if self.dimension == Dimension::Cube {
+                    level.cube_texel(plane, x, y)
+                } else {
+                    level.texel(plane, x, y)
+                };
+                read(lane, texel)
+            });
+            store(out, lane, value);
+        }
+    }
+
+    /// Which texels of a level each lane reads, along each axis.
+    fn axes(
+        &self,
+        level: &Level,
+        sampler: &Sampler,
+        offset: [i32; 3],
+        places: &Places,
+        linear: bool,
+    ) -> [Axis; 3] {
+        let size = [level.width, level.height, level.layers];
+        let axis = |i: usize| {
+            let edges = match self.dimension {
+                Dimension::Cube if linear => Edges::Open,
+                Dimension::Cube => Edges::Wrap(Wrap::ClampToEdge, 0),
+                _ => Edges::Wrap(sampler.wrap[i], offset[i]),
+            };
+            Axis::new(&places.at[i], size[i], edges, linear)
         };
-        if self.dimension == Dimension::Cube {
-            let (x, _) = split(place.at[0], level.width, Wrap::ClampToEdge);
-            let (y, _) = split(place.at[1], level.height, Wrap::ClampToEdge);
-            let tap = |x: i32, y: i32| read(level.cube_texel(place.plane, x, y));
-            [tap(x, y + 1), tap(x + 1, y + 1), tap(x + 1, y), tap(x, y)]
+        let third = if self.dimension == Dimension::D3 {
+            axis(2)
         } else {
-            let (x, _) = taps(place.at[0], level.width, sampler.wrap[0], request.offset[0]);
-            let (y, _) = taps(
-                place.at[1],
-                level.height,
-                sampler.wrap[1],
-                request.offset[1],
-            );
-            let tap = |x: usize, y: usize| read(level.texel(place.plane, x, y));
-            [
-                tap(x[0], y[1]),
-                tap(x[1], y[1]),
-                tap(x[1], y[0]),
-                tap(x[0], y[0]),
-            ]
-        }
-    }
-}
-
-/// Where a lane samples.
-struct Place {
-    /// Layer, face or (for a volume) 0.
-    plane: usize,
-    /// Normalised coordinates on it.
-    at: [f32; 3],
-    /// For a cube: the direction as seen from its face, see [`project`].
-    projected: [f32; 3],
-}
-
-/// How coordinates change from pixel to pixel.
-#[derive(Default)]
-struct Gradients {
-    x: [f32; 3],
-    y: [f32; 3],
-}
-
-impl Gradients {
-    /// The gradients of the coordinates on a cube's face, from those of the direction.
-    fn on_face(&self, place: &Place) -> Gradients {
-        let face = place.plane % 6;
-        let [sc, tc, ma] = place.projected;
-        // s = sc / (2 ma) + 1/2 by the quotient rule.
-        let on_face = |d: [f32; 3]| {
-            let d = project(face, d);
-            let scale = 0.5 / (ma * ma);
-            [
-                scale * (d[0] * ma - sc * d[2]),
-                scale * (d[1] * ma - tc * d[2]),
-                0.0,
-            ]
+            Axis::default()
         };
-        Gradients {
-            x: on_face(self.x),
-            y: on_face(self.y),
+        [axis(0), axis(1), third]
+    }
+
+    /// The level of detail of each lane.
+    fn lambda(&self, request: &Request, places: &Places) -> Floats {
+        match request.detail {
+            Detail::Zero => [0.0; LANES],
+            Detail::Exact(level) => *level,
+            Detail::Gradients { ddx, ddy } => self.detail(ddx, ddy, places),
+            Detail::Implicit { bias } => {
+                let mut gradients = [[[0.0; LANES]; 3]; 2];
+                for (axis, at) in request.coordinates.iter().take(3).enumerate() {
+                    let [x, y] = &mut gradients;
+                    let x = x[axis].as_chunks_mut::<4>().0;
+                    let y = y[axis].as_chunks_mut::<4>().0;
+                    for ((quad, x), y) in at.as_chunks::<4>().0.iter().zip(x).zip(y) {
+                        *x = [quad[1] - quad[0]; 4];
+                        *y = [quad[2] - quad[0]; 4];
+                    }
+                }
+                let count = request.coordinates.len().min(3);
+                let [ddx, ddy] = gradients.each_ref().map(|g| g.each_ref());
+                let mut lambda = self.detail(&ddx[..count], &ddy[..count], places);
+                if let Some(bias) = bias {
+                    for (lambda, bias) in lambda.iter_mut().zip(bias) {
+                        *lambda += bias;
+                    }
+                }
+                lambda
+            }
+        }
+    }
+
+    /// The level of detail for gradients of the coordinates along x and y.
+    fn detail(&self, ddx: &[&Floats], ddy: &[&Floats], places: &Places) -> Floats {
+        let size = self.size(0).map(|n| n as f32);
+        let squared = |gradients: &[&Floats]| {
+            let mut sum = [0.0; LANES];
+            for (gradient, size) in gradients.iter().zip(size) {
+                for (sum, gradient) in sum.iter_mut().zip(*gradient) {
+                    let texels = gradient * size;
+                    *sum += texels * texels;
+                }
+            }
+            sum
+        };
+        let [mut x, y] = match (&places.on_cube, ddx, ddy) {
+            (Some(cube), &[ax, ay, az], &[bx, by, bz]) => [[ax, ay, az], [bx, by, bz]]
+                .map(|gradients| squared(&cube.on_faces(gradients).each_ref())),
+            _ => [squared(ddx), squared(ddy)],
+        };
+        for (x, y) in x.iter_mut().zip(y) {
+            *x = 0.5 * Real::log2(if *x > y { *x } else { y });
+        }
+        x
+    }
+}
+
+/// Where the lanes of a block sample.
+struct Places {
+    /// Normalised coordinates on the plane; for a volume three.
+    at: [Floats; 3],
+    /// Layer, face or (for a volume) 0.
+    plane: [u32; LANES],
+    /// For a cube, how the direction looks from each lane's face.
+    on_cube: Option<Box<OnCube>>,
+}
+
+/// Directions in the frames of the faces that they point at, see [`Face::project`].
+struct OnCube {
+    faces: [Face; LANES],
+    right: Floats,
+    down: Floats,
+    outwards: Floats,
+}
+
+impl Places {
+    fn new(texture: &Texture, request: &Request) -> Self {
+        let mut places = Self {
+            at: [[0.5; LANES]; 3],
+            plane: [0; LANES],
+            on_cube: None,
+        };
+        if let Some(layer) = request.layer {
+            let last = texture.layers() as i32 - 1;
+            for (plane, &layer) in places.plane.iter_mut().zip(layer) {
+                *plane = layer.max(0).min(last) as u32;
+            }
+        }
+        match *request.coordinates {
+            [x, y, z] if texture.dimension == Dimension::Cube => {
+                let mut cube = Box::new(OnCube {
+                    faces: [Face::default(); LANES],
+                    right: [0.0; LANES],
+                    down: [0.0; LANES],
+                    outwards: [0.0; LANES],
+                });
+                for lane in 0..LANES {
+                    let direction = [x[lane], y[lane], z[lane]];
+                    let face = Face::of(direction);
+                    let [right, down, outwards] = face.project(direction);
+                    places.at[0][lane] = 0.5 * (right / outwards) + 0.5;
+                    places.at[1][lane] = 0.5 * (down / outwards) + 0.5;
+                    places.plane[lane] = places.plane[lane] * 6 + face.index();
+                    cube.faces[lane] = face;
+                    cube.right[lane] = right;
+                    cube.down[lane] = down;
+                    cube.outwards[lane] = outwards;
+                }
+                places.on_cube = Some(cube);
+            }
+            _ => {
+                for (at, given) in places.at.iter_mut().zip(request.coordinates) {
+                    *at = **given;
+                }
+            }
+        }
+        if request.clamp_to_edge {
+            for (at, size) in places.at.iter_mut().zip(texture.size(0)) {
+                let half = 0.5 / size as f32;
+                for at in at {
+                    *at = at.max(half).min(1.0 - half);
+                }
+            }
+        }
+        places
+    }
+}
+
+impl OnCube {
+    /// Gradients of the direction as gradients of the coordinates on each lane's face.
+    fn on_faces(&self, [x, y, z]: [&Floats; 3]) -> [Floats; 2] {
+        let mut out = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let [right, down, outwards] = self.faces[lane].project([x[lane], y[lane], z[lane]]);
+            let ma = self.outwards[lane];
+            // s = sc / (2 ma) + 1/2 by the quotient rule.
+            let scale = 0.5 / (ma * ma);
+            out[0][lane] = scale * (right * ma - self.right[lane] * outwards);
+            out[1][lane] = scale * (down * ma - self.down[lane] * outwards);
+        }
+        out
+    }
+}
+
+/// The levels that the lanes of a block read.
+struct Choice {
+    /// The level, or the finer of two.
+    fine: [i32; LANES],
+    /// How much of the next coarser level there is.
+    part: Floats,
+    /// Whether texels are interpolated within a level.
+    linear: [bool; LANES],
+}
+
+impl Choice {
+    fn new(lambda: &Floats, sampler: &Sampler, last: usize) -> Self {
+        let mut choice = Self {
+            fine: [0; LANES],
+            part: [0.0; LANES],
+            linear: [sampler.linear_magnification; LANES],
+        };
+        let last = last as f32;
+        for (lane, &lambda) in lambda.iter().enumerate() {
+            // NaN is magnified.
+            let minified = lambda > 0.0;
+            let lambda = if minified { lambda } else { 0.0 };
+            let lambda = if lambda < last { lambda } else { last };
+            let fine = floor(lambda);
+            let part = lambda - fine;
+            let (fine, part) = if sampler.linear_mip {
+                (fine, part)
+            } else {
+                (if part > 0.5 { fine + 1.0 } else { fine }, 0.0)
+            };
+            choice.fine[lane] = index(fine);
+            choice.part[lane] = part;
+            if minified {
+                choice.linear[lane] = sampler.linear_minification;
+            }
+        }
+        choice
+    }
+
+    /// The finest and the coarsest level that the lanes of a mask read; none when it is empty.
+    fn range(&self, mask: Mask) -> Option<(usize, usize)> {
+        let mut range = None;
+        for lane in mask.lanes() {
+            let fine = self.fine[lane];
+            let coarse = fine + i32::from(self.part[lane] > 0.0);
+            let (low, high) = range.unwrap_or((fine, coarse));
+            range = Some((low.min(fine), high.max(coarse)));
+        }
+        range.map(|(low, high)| (low as usize, high as usize))
+    }
+}
+
+/// What happens at the ends of an axis.
+#[derive(Clone, Copy)]
+enum Edges {
+    /// A wrap mode, and a number of texels that is added before.
+    Wrap(Wrap, i32),
+    /// The texels before the first and after the last are named as such, -1 and the size.
+    Open,
+}
+
+/// The texels that the lanes of a block read along an axis.
+struct Axis {
+    /// The nearest texel, or the first of two.
+    first: [i32; LANES],
+    /// The other one, when filtering linearly.
+    second: [i32; LANES],
+    /// The weight of the other one.
+    weight: Floats,
+}
+
+impl Default for Axis {
+    fn default() -> Self {
+        Self {
+            first: [0; LANES],
+            second: [0; LANES],
+            weight: [0.0; LANES],
         }
     }
 }
 
-/// The differences within a quad.
-fn quad_gradients(coordinates: &[&Floats], quad: usize) -> Gradients {
-    let first = quad * 4;
-    let difference = |lane: usize| {
-        [0, 1, 2].map(|i| {
-            coordinates
-                .get(i)
-                .map_or(0.0, |c| c[first + lane] - c[first])
-        })
-    };
-    Gradients {
-        x: difference(1),
-        y: difference(2),
+/// One lane's texels along an axis. On a cube they may be one step outside.
+#[derive(Clone, Copy)]
+struct Taps {
+    first: usize,
+    second: usize,
+    weight: f32,
+}
+
+impl Axis {
+    /// The texels for normalised coordinates on an axis of `size` texels. All in floats, which hold
+    /// integers up to 2^24 exactly, and without branches, so that it vectorises.
+    fn new(at: &Floats, size: u32, edges: Edges, linear: bool) -> Self {
+        let mut axis = Self::default();
+        let n = size as f32;
+        let half = if linear { 0.5 } else { 0.0 };
+        // Each closure makes (left texel, right texel) of the unwrapped left one.
+        match edges {
+            Edges::Open => {
+                let limit = n - half;
+                axis.fill(
+                    at,
+                    |at| (at * n - half).min(limit).max(-half),
+                    |left| (left, left + 1.0),
+                );
+            }
+            Edges::Wrap(Wrap::ClampToEdge, offset) => {
+                let offset = offset.clamp(-(1 << 21), 1 << 21) as f32;
+                let last = n - 1.0;
+                let clamp = |i: f32| i.max(0.0).min(last);
+                axis.fill(
+                    at,
+                    |at| at * n - half,
+                    |left| (clamp(left + offset), clamp(left + offset + 1.0)),
+                );
+            }
+            Edges::Wrap(Wrap::Repeat, offset) => {
+                let offset = i64::from(offset).rem_euclid(i64::from(size)) as f32;
+                let below = |i: f32| if i >= n { i - n } else { i };
+                axis.fill(
+                    at,
+                    |at| fraction(at) * n - half,
+                    |left| {
+                        let left = left + offset;
+                        let left = below(if left < 0.0 { left + n } else { left });
+                        (left, below(left + 1.0))
+                    },
+                );
+            }
+            Edges::Wrap(Wrap::MirrorRepeat, offset) => {
+                let offset = i64::from(offset).rem_euclid(2 * i64::from(size)) as f32;
+                let period = 2.0 * n;
+                let below = |i: f32| if i >= period { i - period } else { i };
+                let mirror = |i: f32| if i >= n { period - 1.0 - i } else { i };
+                axis.fill(
+                    at,
+                    |at| fraction(0.5 * at) * period - half,
+                    |left| {
+                        let left = left + offset;
+                        let left = below(if left < 0.0 { left + period } else { left });
+                        (mirror(left), mirror(below(left + 1.0)))
+                    },
+                );
+            }
+        }
+        axis
+    }
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        at: &Floats,
+        in_texels: impl Fn(f32) -> f32,
+        wrap: impl Fn(f32) -> (f32, f32),
+    ) {
+        /// Beyond this, a coordinate has no fraction that is worth keeping; what is clamped stays exact.
+        const FAR: f32 = 2_097_152.0;
+        for (lane, &at) in at.iter().enumerate() {
+            // NaN fails the comparison.
+            let x = in_texels(at);
+            let x = if x > -FAR { x } else { -FAR };
+            let x = if x < FAR { x } else { FAR };
+            let left = floor(x);
+            let (first, second) = wrap(left);
+            self.first[lane] = index(first);
+            self.second[lane] = index(second);
+            self.weight[lane] = x - left;
+        }
+    }
+
+    #[inline(always)]
+    fn taps(&self, lane: usize) -> Taps {
+        Taps {
+            first: self.first[lane] as usize,
+            second: self.second[lane] as usize,
+            weight: self.weight[lane],
+        }
     }
 }
 
 impl Level {
-    #[inline]
+    #[inline(always)]
     fn texel(&self, plane: usize, x: usize, y: usize) -> [f32; 4] {
         self.texels[(plane * self.height as usize + y) * self.width as usize + x]
     }
 
-    fn nearest(
-        &self,
-        wrap: [Wrap; 3],
-        place: &Place,
-        offset: [i32; 3],
-        read: &impl Fn([f32; 4]) -> [f32; 4],
-    ) -> [f32; 4] {
-        let x = tap(place.at[0], self.width, wrap[0], offset[0]);
-        let y = tap(place.at[1], self.height, wrap[1], offset[1]);
-        read(self.texel(place.plane, x, y))
-    }
-
+    /// Four texels of a plane, interpolated.
+    #[inline(always)]
     fn bilinear(
         &self,
-        sampler: &Sampler,
-        place: &Place,
-        offset: [i32; 3],
-        read: &impl Fn([f32; 4]) -> [f32; 4],
-    ) -> [f32; 4] {
-        let (x, u) = taps(place.at[0], self.width, sampler.wrap[0], offset[0]);
-        let (y, v) = taps(place.at[1], self.height, sampler.wrap[1], offset[1]);
-        self.four(place.plane, x, y, u, v, read)
-    }
-
-    /// Four texels of a plane, interpolated.
-    #[inline]
-    fn four(
-        &self,
         plane: usize,
-        x: [usize; 2],
-        y: [usize; 2],
-        u: f32,
-        v: f32,
-        read: &impl Fn([f32; 4]) -> [f32; 4],
+        x: Taps,
+        y: Taps,
+        read: impl Fn([f32; 4]) -> [f32; 4],
     ) -> [f32; 4] {
         let tap = |x, y| read(self.texel(plane, x, y));
-        let top = mix(tap(x[0], y[0]), tap(x[1], y[0]), u);
-        let bottom = mix(tap(x[0], y[1]), tap(x[1], y[1]), u);
-        mix(top, bottom, v)
+        let top = mix(tap(x.first, y.first), tap(x.second, y.first), x.weight);
+        let bottom = mix(tap(x.first, y.second), tap(x.second, y.second), x.weight);
+        mix(top, bottom, y.weight)
     }
 
-    fn bilinear_cube(&self, place: &Place, read: &impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
-        let (x, u) = split(place.at[0], self.width, Wrap::ClampToEdge);
-        let (y, v) = split(place.at[1], self.height, Wrap::ClampToEdge);
-        let tap = |x, y| read(self.cube_texel(place.plane, x, y));
-        let top = mix(tap(x, y), tap(x + 1, y), u);
-        let bottom = mix(tap(x, y + 1), tap(x + 1, y + 1), u);
-        mix(top, bottom, v)
+    /// The same on a cube's face, where texels may lie on its neighbours.
+    #[inline(always)]
+    fn bilinear_cube(
+        &self,
+        plane: usize,
+        x: Taps,
+        y: Taps,
+        read: impl Fn([f32; 4]) -> [f32; 4],
+    ) -> [f32; 4] {
+        let tap = |x, y| read(self.cube_texel(plane, x, y));
+        let top = mix(tap(x.first, y.first), tap(x.second, y.first), x.weight);
+        let bottom = mix(tap(x.first, y.second), tap(x.second, y.second), x.weight);
+        mix(top, bottom, y.weight)
     }
 
-    /// A texel of a cube's face; one step beyond an edge it is the neighbour's.
-    fn cube_texel(&self, plane: usize, x: i32, y: i32) -> [f32; 4] {
+    /// A texel of a cube's face. One step beyond an edge (`usize::MAX` is -1) it is the neighbour's.
+    #[inline(always)]
+    fn cube_texel(&self, plane: usize, x: usize, y: usize) -> [f32; 4] {
+        let size = self.width as usize;
+        if x < size && y < size {
+            self.texel(plane, x, y)
+        } else {
+            self.texel_beyond(plane, x as i32, y as i32)
+        }
+    }
+
+    #[cold]
+    fn texel_beyond(&self, plane: usize, x: i32, y: i32) -> [f32; 4] {
         let size = self.width as i32;
         let inside = |i: i32| (0..size).contains(&i);
-        let (cx, cy) = (x.clamp(0, size - 1), y.clamp(0, size - 1));
-        if inside(x) && inside(y) || !inside(x) && !inside(y) {
-            return self.texel(plane, cx as usize, cy as usize);
+        let clamp = |i: i32| i.clamp(0, size - 1) as usize;
+        if inside(x) == inside(y) {
+            return self.texel(plane, clamp(x), clamp(y));
         }
         // The middle of the texel, if the face went on, seen from the centre: the neighbour's
         // outermost texel, off by less than half a texel along the edge.
         let middle = |i: i32| (i as f32 + 0.5) / size as f32;
         let direction = cube_direction(plane % 6, middle(x), middle(y));
-        let (face, s, t) = cube_face(direction);
-        let x = tap(s, self.width, Wrap::ClampToEdge, 0);
-        let y = tap(t, self.height, Wrap::ClampToEdge, 0);
-        self.texel(plane - plane % 6 + face, x, y)
+        let face = Face::of(direction);
+        let [sc, tc, ma] = face.project(direction);
+        let along = |c: f32| clamp(floor((0.5 * (c / ma) + 0.5) * size as f32) as i32);
+        self.texel(
+            plane - plane % 6 + face.index() as usize,
+            along(sc),
+            along(tc),
+        )
     }
+}
 
-    fn volume(
-        &self,
-        sampler: &Sampler,
-        place: &Place,
-        offset: [i32; 3],
-        linear: bool,
-        read: &impl Fn([f32; 4]) -> [f32; 4],
-    ) -> [f32; 4] {
-        let size = [self.width, self.height, self.layers];
-        if linear {
-            let [(x, u), (y, v), (z, w)] =
-                [0, 1, 2].map(|i| taps(place.at[i], size[i], sampler.wrap[i], offset[i]));
-            mix(
-                self.four(z[0], x, y, u, v, read),
-                self.four(z[1], x, y, u, v, read),
-                w,
-            )
-        } else {
-            let [x, y, z] =
-                [0, 1, 2].map(|i| tap(place.at[i], size[i], sampler.wrap[i], offset[i]));
-            read(self.texel(z, x, y))
-        }
+#[inline(always)]
+fn store(out: &mut [Floats; 4], lane: usize, value: [f32; 4]) {
+    for (out, value) in out.iter_mut().zip(value) {
+        out[lane] = value;
     }
 }
 
 /// `a + (b - a) * t` per component.
-#[inline]
+#[inline(always)]
 fn mix(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
     std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
 }
 
-/// The largest integer not above a value, without the call that `f32::floor` is on older instruction sets.
-/// Values from 2^23 on, infinities and NaN come back as they are.
-#[inline]
+/// The largest integer not above a value of less than 2^22, by rounding at the end of the mantissa:
+/// it vectorises everywhere, which `f32::floor` does on newer instruction sets only.
+#[inline(always)]
 fn floor(x: f32) -> f32 {
-    if x.abs() < 8_388_608.0 {
-        let cut = x as i32 as f32;
-        if cut > x { cut - 1.0 } else { cut }
-    } else {
-        x
-    }
+    const ROUND: f32 = 12_582_912.0;
+    let rounded = (x + ROUND) - ROUND;
+    if rounded > x { rounded - 1.0 } else { rounded }
 }
 
-/// A normalised coordinate in texels, within one period of its wrap mode so that it fits an integer.
-#[inline]
-fn in_texels(at: f32, size: u32, wrap: Wrap) -> f32 {
-    let period = match wrap {
-        Wrap::Repeat => at - floor(at),
-        Wrap::MirrorRepeat => at - 2.0 * floor(0.5 * at),
-        Wrap::ClampToEdge => at,
-    };
-    // NaN, which infinities have become under the periodic modes, is 0.
-    let period = if period.is_nan() { 0.0 } else { period };
-    (period * size as f32).clamp(-1.0e9, 1.0e9)
+/// An integer from -2^22 to 2^22, likewise.
+#[inline(always)]
+fn index(x: f32) -> i32 {
+    const ROUND: f32 = 12_582_912.0;
+    (x + ROUND).to_bits().wrapping_sub(ROUND.to_bits()) as i32
 }
 
-/// The left of the two texels that linear filtering reads, unwrapped, and the weight of the right one.
-#[inline]
-fn split(at: f32, size: u32, wrap: Wrap) -> (i32, f32) {
-    let x = in_texels(at, size, wrap) - 0.5;
-    let left = floor(x);
-    (left as i32, x - left)
+/// What a coordinate is above an integer, 0..=1; 0 from 2^21 on (where f32 has quarters at best), and for NaN.
+#[inline(always)]
+fn fraction(x: f32) -> f32 {
+    let part = x - floor(x);
+    if x.abs() < 2_097_152.0 { part } else { 0.0 }
 }
 
-/// The two texels that linear filtering reads along an axis, and the weight of the second.
-#[inline]
-fn taps(at: f32, size: u32, wrap: Wrap, offset: i32) -> ([usize; 2], f32) {
-    let (left, weight) = split(at, size, wrap);
-    let left = left.saturating_add(offset);
-    let right = left.saturating_add(1);
-    (
-        [wrapped(left, size, wrap), wrapped(right, size, wrap)],
-        weight,
-    )
+/// A face of a cube.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Face {
+    /// Its axis: 0, 1 or 2.
+    axis: u32,
+    /// 1 or -1: at which end.
+    sign: f32,
 }
 
-/// The nearest texel along an axis.
-#[inline]
-fn tap(at: f32, size: u32, wrap: Wrap, offset: i32) -> usize {
-    let i = floor(in_texels(at, size, wrap)) as i32;
-    wrapped(i.saturating_add(offset), size, wrap)
-}
-
-/// A texel index brought inside.
-#[inline]
-fn wrapped(i: i32, size: u32, wrap: Wrap) -> usize {
-    if (i as u32) < size {
-        return i as usize;
-    }
-    let (i, size) = (i64::from(i), i64::from(size));
-    let inside = match wrap {
-        Wrap::Repeat => i.rem_euclid(size),
-        Wrap::ClampToEdge => i.clamp(0, size - 1),
-        Wrap::MirrorRepeat => {
-            let i = i.rem_euclid(2 * size);
-            i.min(2 * size - 1 - i)
+impl Face {
+    /// The face that a direction points at. Of equal axes z wins, then y.
+    #[inline(always)]
+    fn of([x, y, z]: [f32; 3]) -> Self {
+        let y_wins = y.abs() >= x.abs();
+        let (axis, along) = if y_wins { (1, y) } else { (0, x) };
+        let z_wins = z.abs() >= along.abs();
+        let (axis, along) = if z_wins { (2, z) } else { (axis, along) };
+        Self {
+            axis,
+            sign: if along < 0.0 { -1.0 } else { 1.0 },
         }
-    };
-    inside as usize
-}
-
-/// A direction in the frame of a cube's face: to the right, down, and outwards.
-#[inline]
-fn project(face: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
-    match face {
-        0 => [-z, -y, x],
-        1 => [z, -y, -x],
-        2 => [x, z, y],
-        3 => [x, -z, -y],
-        4 => [x, -y, z],
-        _ => [-x, -y, -z],
     }
-}
 
-/// The face that a direction points at, and the coordinates on it. Of equal axes z wins, then y.
-#[inline]
-fn cube_face(direction: [f32; 3]) -> (usize, f32, f32) {
-    let [x, y, z] = direction.map(f32::abs);
-    let axis = if z >= x && z >= y {
-        2
-    } else if y >= x {
-        1
-    } else {
-        0
-    };
-    let face = 2 * axis + usize::from(direction[axis] < 0.0);
-    let [sc, tc, ma] = project(face, direction);
-    (face, 0.5 * (sc / ma) + 0.5, 0.5 * (tc / ma) + 0.5)
+    /// +x, -x, +y, -y, +z, -z.
+    #[inline(always)]
+    fn index(self) -> u32 {
+        2 * self.axis + u32::from(self.sign < 0.0)
+    }
+
+    /// A direction in the face's frame: to the right, down, and outwards.
+    #[inline(always)]
+    fn project(self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let (on_x, on_y) = (self.axis == 0, self.axis == 1);
+        // One choice after the other rather than a match: it vectorises.
+        let right = if on_x { -z } else { x };
+        let right = if on_y { right } else { right * self.sign };
+        let down = if on_y { z * self.sign } else { -y };
+        let outwards = if on_x { x } else { z };
+        let outwards = if on_y { y } else { outwards };
+        [right, down, outwards * self.sign]
+    }
 }
 
 /// The point of the unit cube's surface at coordinates of a face.
@@ -928,9 +1077,12 @@ mod tests {
         // Every point of every face comes back to its own coordinates.
         for face in 0..6 {
             let (s, t) = (0.3, 0.8);
-            let (found, found_s, found_t) = cube_face(cube_direction(face, s, t));
-            assert_eq!(found, face);
-            assert!((found_s - s).abs() < 1e-6 && (found_t - t).abs() < 1e-6);
+            let direction = cube_direction(face, s, t);
+            let found = Face::of(direction);
+            assert_eq!(found.index() as usize, face);
+            let [sc, tc, ma] = found.project(direction);
+            assert!((0.5 * (sc / ma) + 0.5 - s).abs() < 1e-6);
+            assert!((0.5 * (tc / ma) + 0.5 - t).abs() < 1e-6);
         }
     }
 
