@@ -87,11 +87,40 @@ pub fn shade_into(
 /// The picture in fine pixels, fragments that hide each other resolved. Background pixels are 0.
 pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
     let mut picture = Picture::empty(coverage.width, coverage.height);
-    let mut nearest = if coverage.late {
-        vec![1.0_f32; picture.pixels.len()]
-    } else {
-        Vec::new()
-    };
+    for (pixel, fragment) in nearest(coverage, shading).into_iter().enumerate() {
+        if let Some(fragment) = fragment {
+            picture.pixels[pixel] = shading.colours[fragment as usize];
+            picture.covered[pixel] = 1.0;
+        }
+    }
+    picture
+}
+
+/// The coverage with those fragments alone that the picture shows; the others have become helpers.
+/// What a shader that discards computes where it is hidden should not count as seen.
+pub fn seen(coverage: &Coverage, shading: &Shading) -> Coverage {
+    let nearest = nearest(coverage, shading);
+    let mut seen = coverage.clone();
+    seen.fragments = 0;
+    for (block, before) in seen.blocks.iter_mut().zip(&coverage.blocks) {
+        block.first = seen.fragments;
+        for (i, lane) in before.covered.lanes().enumerate() {
+            let fragment = (before.first + i) as u32;
+            if nearest[before.pixels[lane] as usize] != Some(fragment) {
+                block.covered.0[lane / 64] &= !(1 << (lane % 64));
+                block.pixels[lane] = u32::MAX;
+            }
+        }
+        seen.fragments += block.covered_count();
+    }
+    seen
+}
+
+/// For each fine pixel the fragment that it shows: the nearest that is alive, of equal ones the first.
+fn nearest(coverage: &Coverage, shading: &Shading) -> Vec<Option<u32>> {
+    let count = coverage.width as usize * coverage.height as usize;
+    let mut nearest = vec![None; count];
+    let mut depths = vec![1.0_f32; if coverage.late { count } else { 0 }];
     for block in &coverage.blocks {
         for (i, lane) in block.covered.lanes().enumerate() {
             let fragment = block.first + i;
@@ -100,20 +129,18 @@ pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
             }
             let pixel = block.pixels[lane] as usize;
             if coverage.late {
-                let depth = shading.depths.get(fragment);
-                let depth = depth.copied().unwrap_or(block.depths[lane]);
+                let own = shading.depths.get(fragment);
                 // Clamped to the viewport's range; NaN is 0.
-                let depth = depth.max(0.0);
-                if depth >= nearest[pixel] {
+                let depth = own.copied().unwrap_or(block.depths[lane]).max(0.0);
+                if depth >= depths[pixel] {
                     continue;
                 }
-                nearest[pixel] = depth;
+                depths[pixel] = depth;
             }
-            picture.pixels[pixel] = shading.colours[fragment];
-            picture.covered[pixel] = 1.0;
+            nearest[pixel] = Some(fragment as u32);
         }
     }
-    picture
+    nearest
 }
 
 /// Draws a frame whole: rasterises, shades, resolves, and filters the grid's fine pixels into pixels.
@@ -265,4 +292,103 @@ fn merge(mut first: Profile, second: Profile) -> Profile {
         }
     }
     first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::lane::Mask;
+    use crate::eval::machine::Probe;
+
+    /// Three fragments of two pixels: two on the first, in lanes 0 and 4.
+    fn coverage(depths: [f32; 3]) -> Coverage {
+        let mut block = Block {
+            inputs: Vec::new(),
+            active: Mask([0xff, 0, 0, 0]),
+            covered: Mask([0b1_0011, 0, 0, 0]),
+            pixels: [u32::MAX; LANES],
+            depths: [0.0; LANES],
+            first: 0,
+        };
+        for ((lane, pixel), depth) in [(0, 0), (1, 1), (4, 0)].into_iter().zip(depths) {
+            block.pixels[lane] = pixel;
+            block.depths[lane] = depth;
+        }
+        Coverage {
+            width: 2,
+            height: 1,
+            grid: 1,
+            blocks: vec![block],
+            fragments: 3,
+            slots: Vec::new(),
+            late: true,
+            vertex_profile: Profile::default(),
+        }
+    }
+
+    fn shading(alive: [bool; 3]) -> Shading {
+        Shading {
+            colours: vec![[1.0; 4], [2.0; 4], [3.0; 4]],
+            alive: alive.to_vec(),
+            ..Shading::default()
+        }
+    }
+
+    #[test]
+    fn the_nearest_alive_fragment_is_shown() {
+        let shown = |depths, alive| {
+            let picture = resolve(&coverage(depths), &shading(alive));
+            assert_eq!(picture.covered[0], f32::from(picture.pixels[0][0] > 0.0));
+            [picture.pixels[0][0], picture.pixels[1][0]]
+        };
+        assert_eq!(shown([0.2, 0.2, 0.5], [true; 3]), [1.0, 2.0]);
+        assert_eq!(shown([0.5, 0.2, 0.2], [true; 3]), [3.0, 2.0]);
+        assert_eq!(shown([0.2, 0.2, 0.2], [true; 3]), [1.0, 2.0]);
+        assert_eq!(shown([0.2, 0.2, 0.5], [false, true, true]), [3.0, 2.0]);
+        assert_eq!(shown([0.2, 0.2, 0.5], [false, true, false]), [0.0, 2.0]);
+    }
+
+    #[test]
+    fn a_returned_depth_counts() {
+        let coverage = coverage([0.2, 0.2, 0.5]);
+        let mut shading = shading([true; 3]);
+        shading.depths = vec![0.9, 1.0, 0.8];
+        let picture = resolve(&coverage, &shading);
+        assert_eq!((picture.pixels[0][0], picture.covered[1]), (3.0, 0.0));
+        shading.depths = vec![0.9, -2.0, f32::NAN];
+        let picture = resolve(&coverage, &shading);
+        assert_eq!((picture.pixels[0][0], picture.pixels[1][0]), (3.0, 2.0));
+    }
+
+    #[test]
+    fn what_is_hidden_is_not_seen() {
+        let seen = seen(&coverage([0.5, 0.2, 0.2]), &shading([true; 3]));
+        assert_eq!(seen.fragments, 2);
+        let block = &seen.blocks[0];
+        assert_eq!(block.covered, Mask([0b1_0010, 0, 0, 0]));
+        assert_eq!(block.active, Mask([0xff, 0, 0, 0]));
+        assert_eq!(block.pixels[..5], [u32::MAX, 1, u32::MAX, u32::MAX, 0]);
+    }
+
+    #[test]
+    fn profiles_add_up() {
+        let profile = |min, max| Profile {
+            lanes: 2,
+            probes: vec![vec![Probe {
+                count: 2,
+                sum: f64::from(min + max),
+                min,
+                max,
+            }]],
+            ..Profile::default()
+        };
+        let both = merge(profile(1.0, 2.0), profile(-1.0, 1.5));
+        let probe = both.probes[0][0];
+        assert_eq!((both.lanes, probe.count, probe.sum), (4, 4, 3.5));
+        assert_eq!((probe.min, probe.max), (-1.0, 2.0));
+        for (a, b) in [(f32::NAN, 1.0), (1.0, f32::NAN)] {
+            let probe = merge(profile(a, a), profile(b, b)).probes[0][0];
+            assert!(probe.min.is_nan() && probe.max.is_nan());
+        }
+    }
 }
