@@ -58,7 +58,7 @@ pub enum Target {
     Glsl,
     /// HLSL, shader model 6.0.
     Hlsl,
-    /// The Metal shading language, 2.0.
+    /// The Metal shading language, 2.1.
     Msl,
 }
 

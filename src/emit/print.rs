@@ -36,6 +36,8 @@ pub(crate) struct Printed {
     pub(crate) directives: Vec<String>,
     /// Its declarations, in the writer's order.
     pub(crate) items: Vec<Item>,
+    /// Names at module scope that could not stay, and what they became.
+    pub(crate) renamed: BTreeMap<String, String>,
 }
 
 /// A function of a module.
@@ -68,11 +70,15 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     let mut labels = Labels::default();
     let mut taken = wishes.taken.clone();
     let mut locals = wishes.outside.clone();
-    let mut global = |name: Option<&str>, fallback: &str| -> String {
-        let name = match name {
+    let mut renamed = BTreeMap::new();
+    let mut global = |wish: Option<&str>, fallback: &str| -> String {
+        let name = match wish {
             Some(name) if (wishes.keep)(name) => name.to_owned(),
-            name => taken.take(name.unwrap_or(fallback)),
+            _ => taken.take(wish.unwrap_or(fallback)),
         };
+        if let Some(wish) = wish.filter(|wish| **wish != name) {
+            renamed.insert(wish.to_owned(), name.clone());
+        }
         taken.reserve([name.as_str()]);
         locals.reserve([name.as_str()]);
         name
@@ -145,6 +151,7 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     let mut printed = Printed {
         directives: text.directives.iter().map(|d| (*d).to_owned()).collect(),
         items: Vec::new(),
+        renamed,
     };
     for declaration in &text.declarations {
         let raw = &written[declaration.span.clone()];
@@ -220,11 +227,16 @@ impl Labels {
         let mut out = String::with_capacity(text.len());
         let mut uses = BTreeSet::new();
         let mut predeclared = BTreeSet::new();
+        // Neither members nor attributes are looked up among declarations.
         let mut after_point = false;
+        let mut after_at = false;
+        let mut in_attribute = false;
         for token in tokens(text) {
             let word = &text[token.span];
             if token.kind != Kind::Word {
                 after_point = word == ".";
+                in_attribute = (in_attribute && word != ")") || (after_at && word == "(");
+                after_at = word == "@";
                 out.push_str(word);
                 continue;
             }
@@ -238,7 +250,7 @@ impl Labels {
                     out.push_str(name);
                 }
                 (None, None) => {
-                    if !after_point {
+                    if !(after_point || after_at || in_attribute) {
                         predeclared.insert(word.to_owned());
                     }
                     out.push_str(word);

@@ -1,15 +1,16 @@
 //! Puts levels behind the author's text, or each into a file of its own.
 
 use super::lock::FORMAT;
-use super::names::{Names, in_words, is_predeclared};
+use super::names::{Names, in_words};
 use super::print::{Item, Owner, Printed, Wishes, print, value_name};
 use super::source::{Keyword, Text};
+use super::tokens::words;
 use super::{EmitLevel, Form, file_name, flaw, read_back, stem, tidy};
 use crate::front::Source;
 use crate::{Diagnostic, Result};
 use lodc_passes::shader::Stage;
 use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// The author's text with its levels.
@@ -19,40 +20,82 @@ pub(crate) struct Spliced {
     pub(crate) by_override: bool,
 }
 
-/// The author's text, with the fragment entry point replaced by one that chooses among it and the levels.
-pub(crate) fn splice(source: &Source, levels: &[EmitLevel], form: Form) -> Result<Spliced> {
-    let text = Text::new(&source.text);
-    match spliced(source, &text, &source.module, levels, form)? {
-        Some(spliced) => Ok(spliced),
-        None => {
-            // A declaration of the author's hides something predeclared that a level needs. In a text of our
-            // own it gets another name.
-            let (composed, module) = composed(source)?;
-            let text = Text::new(&composed);
-            spliced(source, &text, &module, levels, form)?.ok_or_else(|| {
-                flaw(
-                    Diagnostic::error("internal error: names still clash in a composed module"),
-                    source,
-                )
-            })
+/// A text with levels to be put behind it, and the module that it was parsed to.
+struct Body<'a> {
+    source: &'a Source,
+    text: Text<'a>,
+    module: &'a Module,
+    declared: BTreeSet<&'a str>,
+    /// Names of the levels' modules that this text has under others.
+    renamed: BTreeMap<String, String>,
+}
+
+impl<'a> Body<'a> {
+    fn new(
+        source: &'a Source,
+        text: &'a str,
+        module: &'a Module,
+        renamed: BTreeMap<String, String>,
+    ) -> Self {
+        let text = Text::new(text);
+        // The names borrow from the text itself, which outlives what was read of it.
+        let declared = text
+            .declarations
+            .iter()
+            .map(|d| &text.text[d.name_span.clone()])
+            .collect();
+        Self {
+            source,
+            text,
+            module,
+            declared,
+            renamed,
         }
+    }
+
+    /// Whether an item means something predeclared that a declaration of the text hides.
+    fn hides_from(&self, item: &Item) -> bool {
+        item.predeclared
+            .iter()
+            .any(|word| self.declared.contains(word.as_str()))
     }
 }
 
-/// The whole source as one module in which nothing hides what is predeclared.
-fn composed(source: &Source) -> Result<(String, Module)> {
-    let kept: BTreeSet<&str> = source
-        .module
-        .entry_points
-        .iter()
-        .map(|entry| entry.name.as_str())
-        .chain(
-            source
-                .module
-                .overrides
-                .iter()
-                .filter_map(|(_, o)| o.name.as_deref()),
+/// The author's text, with the fragment entry point replaced by one that chooses among it and the levels.
+pub(crate) fn splice(source: &Source, levels: &[EmitLevel], form: Form) -> Result<Spliced> {
+    over_text(source, |body| spliced(body, levels, form))
+}
+
+/// A level as a module of its own, with the author's names.
+pub(crate) fn alone(source: &Source, number: usize, level: &EmitLevel) -> Result<String> {
+    over_text(source, |body| written_alone(body, number, level))
+}
+
+/// Makes something of the author's text. Where that cannot be, because a declaration of the author's hides
+/// something predeclared that a level needs, of a text of our own in which it has another name.
+fn over_text<T>(source: &Source, make: impl Fn(&Body<'_>) -> Result<Option<T>>) -> Result<T> {
+    let body = Body::new(source, &source.text, &source.module, BTreeMap::new());
+    if let Some(made) = make(&body)? {
+        return Ok(made);
+    }
+    let (composed, renamed) = composed(source)?;
+    let module = read_back(&composed, source)?.module;
+    let body = Body::new(source, &composed, &module, renamed);
+    make(&body)?.ok_or_else(|| {
+        flaw(
+            Diagnostic::error("internal error: names still clash in a composed module"),
+            source,
         )
+    })
+}
+
+/// The whole source as one text in which nothing hides what is predeclared, and what got other names in it.
+fn composed(source: &Source) -> Result<(String, BTreeMap<String, String>)> {
+    let text = Text::new(&source.text);
+    let settings = source.module.overrides.iter();
+    let kept: BTreeSet<&str> = (source.module.entry_points.iter())
+        .map(|entry| entry.name.as_str())
+        .chain(settings.filter_map(|(_, setting)| setting.name.as_deref()))
         .collect();
     let printed = print(
         &source.module,
@@ -61,31 +104,25 @@ fn composed(source: &Source) -> Result<(String, Module)> {
             taken: &Names::default(),
             outside: &Names::default(),
             value: &|_, _| None,
-            short_types: uses_short_types(&Text::new(&source.text)),
+            short_types: uses_short_types(&text),
         },
     )
     .map_err(|reason| unwritable(source, &reason))?;
-    let author = Text::new(&source.text);
-    let text = assembled(
-        "",
-        &directives(&author, &printed),
-        &printed.items.iter().collect::<Vec<_>>(),
-    );
-    let module = read_back(&text, source)?.module;
-    Ok((text, module))
+    let items: Vec<(Keyword, &str)> = printed
+        .items
+        .iter()
+        .map(|item| (item.keyword, item.text.as_str()))
+        .collect();
+    let composed = assembled("", &directives(&text, &printed), &items);
+    Ok((composed, printed.renamed))
 }
 
 /// `None` when a declaration of the text hides something predeclared that a level needs.
-fn spliced(
-    source: &Source,
-    text: &Text<'_>,
-    module: &Module,
-    levels: &[EmitLevel],
-    form: Form,
-) -> Result<Option<Spliced>> {
+fn spliced(body: &Body<'_>, levels: &[EmitLevel], form: Form) -> Result<Option<Spliced>> {
+    let (source, text) = (body.source, &body.text);
     let mut names = Names::default();
     names.reserve(text.words.iter().copied());
-    let control = Control::new(source, text, module, form, &mut names)?;
+    let control = Control::new(body, form, &mut names)?;
     let mut out = header(source, levels);
     let line_break = |out: &mut String| {
         if !out.is_empty() && !out.ends_with('\n') {
@@ -142,13 +179,12 @@ fn spliced(
     let result = if signature.returns { "return " } else { "" };
     writeln!(out, "    {result}{}({arguments});\n}}", all[levels.len()]).ok();
 
-    let declared: BTreeSet<&str> = text.declarations.iter().map(|d| d.name.as_str()).collect();
     let mut extra: Vec<Item> = Vec::new();
     let attribute = text
         .derivative_attribute()
         .map_or(String::new(), |a| format!("{a}\n"));
     for (at, (level, function)) in levels.iter().zip(&functions).enumerate() {
-        let printed = level_function(source, text, level, function, &declared, &mut names)?;
+        let printed = level_function(body, level, function, &names)?;
         let mut wanted = vec![function.clone()];
         let mut done = BTreeSet::new();
         let mut behind = Vec::new();
@@ -156,14 +192,10 @@ fn spliced(
             let Some(item) = printed.items.iter().find(|item| item.name == name) else {
                 continue;
             };
-            if declared.contains(&*name) || !done.insert(name.clone()) {
+            if body.declared.contains(&*name) || !done.insert(name.clone()) {
                 continue;
             }
-            if item
-                .predeclared
-                .iter()
-                .any(|word| declared.contains(word.as_str()))
-            {
+            if body.hides_from(item) {
                 return Ok(None);
             }
             wanted.extend(item.uses.iter().cloned());
@@ -199,20 +231,65 @@ fn spliced(
     }))
 }
 
+/// A level's module under the names of the text. What the text declares is not written again, so it needs no
+/// value: naga's writer has no form for the values that pipeline constants may start with.
+fn renamed_module(body: &Body<'_>, level: &EmitLevel) -> Module {
+    let mut module = level.shader.module().clone();
+    let rename = |name: &mut Option<String>| {
+        if let Some(name) = name
+            && let Some(now) = body.renamed.get(name)
+        {
+            name.clone_from(now);
+        }
+        name.as_deref()
+            .is_some_and(|name| body.declared.contains(name))
+    };
+    for handle in module
+        .types
+        .iter()
+        .map(|(handle, _)| handle)
+        .collect::<Vec<_>>()
+    {
+        let mut ty = module.types[handle].clone();
+        if ty
+            .name
+            .as_ref()
+            .is_some_and(|name| body.renamed.contains_key(name))
+        {
+            rename(&mut ty.name);
+            module.types.replace(handle, ty);
+        }
+    }
+    for (_, variable) in module.global_variables.iter_mut() {
+        if rename(&mut variable.name) {
+            variable.init = None;
+        }
+    }
+    for (_, setting) in module.overrides.iter_mut() {
+        if rename(&mut setting.name) {
+            setting.init = None;
+        }
+    }
+    for (_, constant) in module.constants.iter_mut() {
+        // One that the text has within a function only is written as its value.
+        if !rename(&mut constant.name) {
+            constant.name = None;
+        }
+    }
+    module
+}
+
 /// The function of a level, written with what it needs.
 fn level_function(
-    source: &Source,
-    text: &Text<'_>,
+    body: &Body<'_>,
     level: &EmitLevel,
     name: &str,
-    declared: &BTreeSet<&str>,
-    names: &mut Names,
+    names: &Names,
 ) -> Result<Printed> {
-    let mut module = level.shader.module().clone();
+    let mut module = renamed_module(body, level);
     let Some(entry) = level.shader.index(Stage::Fragment) else {
-        return Err(Diagnostic::error(
-            "internal error: a level has no fragment entry point",
-        ));
+        let error = Diagnostic::error("internal error: a level has no fragment entry point");
+        return Err(flaw(error, body.source));
     };
     let mut function = module.entry_points.swap_remove(entry).function;
     module.entry_points.clear();
@@ -223,96 +300,114 @@ fn level_function(
         result.binding = None;
     }
     function.name = Some(name.to_owned());
-    module.functions.append(function, naga::Span::UNDEFINED);
-    // Constants within functions have names too, but not at module scope.
-    let texts_own = |name: &str| declared.contains(name);
-    for (_, constant) in module.constants.iter_mut() {
-        constant.name.take_if(|name| !texts_own(name));
-    }
+    let handle = module.functions.append(function, naga::Span::UNDEFINED);
     let mut outside = Names::default();
-    outside.reserve(declared.iter().copied());
+    outside.reserve(body.declared.iter().copied());
     print(
         &module,
         &Wishes {
-            keep: &|wish| wish == name || texts_own(wish),
+            keep: &|wish| wish == name || body.declared.contains(wish),
             taken: names,
             outside: &outside,
-            value: &|_, value| value_name(&level.shader, Stage::Fragment, value),
-            short_types: uses_short_types(text),
+            value: &|owner, value| {
+                let is_own = owner == Owner::Function(handle);
+                is_own.then(|| value_name(&level.shader, Stage::Fragment, value))?
+            },
+            short_types: uses_short_types(&body.text),
         },
     )
-    .map_err(|reason| unwritable(source, &reason))
+    .map_err(|reason| unwritable(body.source, &reason))
 }
 
-/// A level as a module of its own, with the author's names.
-pub(crate) fn alone(source: &Source, number: usize, level: &EmitLevel) -> Result<String> {
-    let text = Text::new(&source.text);
-    let declared: BTreeSet<&str> = text.declarations.iter().map(|d| d.name.as_str()).collect();
-    let module = level.shader.module();
+/// A level's entry points with the declarations of the text that they need, as they stand there.
+fn written_alone(body: &Body<'_>, number: usize, level: &EmitLevel) -> Result<Option<String>> {
+    let (source, text) = (body.source, &body.text);
+    let module = renamed_module(body, level);
     let entries: BTreeSet<&str> = module
         .entry_points
         .iter()
         .map(|e| e.name.as_str())
         .collect();
-    let settings: BTreeSet<&str> = module
-        .overrides
-        .iter()
-        .filter_map(|(_, o)| o.name.as_deref())
-        .collect();
     let fragment = level.shader.index(Stage::Fragment);
     let mut taken = Names::default();
     taken.reserve(text.words.iter().copied());
     let printed = print(
-        module,
+        &module,
         &Wishes {
-            keep: &|name| {
-                entries.contains(name)
-                    || settings.contains(name)
-                    || (declared.contains(name) && !is_predeclared(name))
-            },
+            keep: &|name| body.declared.contains(name),
             taken: &taken,
             outside: &Names::default(),
             value: &|owner, value| {
-                let stage = if owner == Owner::EntryPoint(fragment?) {
+                let Owner::EntryPoint(entry) = owner else {
+                    return None;
+                };
+                let is_fragment = Some(entry) == fragment;
+                let stage = if is_fragment {
                     Stage::Fragment
                 } else {
                     Stage::Vertex
                 };
                 value_name(&level.shader, stage, value)
             },
-            short_types: uses_short_types(&text),
+            short_types: uses_short_types(text),
         },
     )
     .map_err(|reason| unwritable(source, &reason))?;
 
     // Pipeline constants stay, used or not: a host that sets one that is not there gets an error.
-    let mut wanted: Vec<String> = printed
-        .items
+    let mut wanted: Vec<&str> = text
+        .declarations
         .iter()
-        .filter(|item| item.keyword == Keyword::Override || entries.contains(item.name.as_str()))
-        .map(|item| item.name.clone())
+        .filter(|d| d.keyword == Keyword::Override)
+        .map(|d| d.name.as_str())
+        .chain(entries.iter().copied())
         .collect();
-    let mut used = BTreeSet::new();
+    let own = |name: &str| text.declaration(name).filter(|_| !entries.contains(name));
+    let mut needed = BTreeSet::new();
     while let Some(name) = wanted.pop() {
-        if let Some(item) = printed.items.iter().find(|item| item.name == name)
-            && used.insert(name)
-        {
-            wanted.extend(item.uses.iter().cloned());
-            wanted.extend(item.predeclared.iter().cloned());
+        if !needed.insert(name) {
+            continue;
+        }
+        if let Some(declaration) = own(name) {
+            let words = words(&text.text[declaration.span.clone()]);
+            wanted.extend(words.into_iter().filter(|word| own(word).is_some()));
+        } else if let Some(item) = printed.items.iter().find(|item| item.name == name) {
+            if body.hides_from(item) {
+                return Ok(None);
+            }
+            wanted.extend(
+                item.uses
+                    .iter()
+                    .chain(&item.predeclared)
+                    .map(String::as_str),
+            );
         }
     }
-    let mut items: Vec<Item> = printed
+    let mut items: Vec<(Keyword, String)> = Vec::new();
+    for declaration in text
+        .declarations
+        .iter()
+        .filter(|d| !entries.contains(d.name.as_str()))
+    {
+        if needed.contains(declaration.name.as_str()) {
+            let span = declaration.span.clone();
+            items.push((
+                declaration.keyword,
+                format!("{}\n", text.text[span].replace("\r\n", "\n")),
+            ));
+        }
+    }
+    for item in printed
         .items
         .iter()
-        .filter(|item| used.contains(&item.name))
-        .cloned()
-        .collect();
-    if let Some(attribute) = text.derivative_attribute() {
-        for item in items
-            .iter_mut()
-            .filter(|item| item.text.starts_with("@fragment"))
-        {
-            item.text = format!("{attribute}\n{}", item.text);
+        .filter(|item| own(&item.name).is_none())
+    {
+        if needed.contains(item.name.as_str()) {
+            let attribute = text
+                .derivative_attribute()
+                .filter(|_| item.text.starts_with("@fragment"))
+                .map_or(String::new(), |attribute| format!("{attribute}\n"));
+            items.push((item.keyword, format!("{attribute}{}", item.text)));
         }
     }
     let header = format!(
@@ -323,12 +418,9 @@ pub(crate) fn alone(source: &Source, number: usize, level: &EmitLevel) -> Result
         level.autolod,
         sentence(&level.says),
     );
-    let text_of_level = assembled(
-        &header,
-        &directives(&text, &printed),
-        &items.iter().collect::<Vec<_>>(),
-    );
-    Ok(with_line_ends(text_of_level, &text))
+    let items: Vec<(Keyword, &str)> = items.iter().map(|(k, text)| (*k, text.as_str())).collect();
+    let written = assembled(&header, &directives(text, &printed), &items);
+    Ok(Some(with_line_ends(written, text)))
 }
 
 /// Directives of the author's, then those that the writer asks for beside them.
@@ -343,23 +435,24 @@ fn directives(author: &Text<'_>, printed: &Printed) -> Vec<String> {
 }
 
 /// A module's text from its parts: blank lines around what takes several lines.
-fn assembled(header: &str, directives: &[String], items: &[&Item]) -> String {
+fn assembled(header: &str, directives: &[String], items: &[(Keyword, &str)]) -> String {
     let mut out = header.to_owned();
     for directive in directives {
         out.push_str(directive);
         out.push('\n');
     }
-    let is_long = |item: &Item| item.text.trim_end().contains('\n');
-    for (at, item) in items.iter().enumerate() {
-        let before = at.checked_sub(1).map(|before| items[before]);
+    let mut before: Option<(Keyword, bool)> = None;
+    for (keyword, text) in items {
+        let is_long = text.trim_end().contains('\n');
         let apart = match before {
             None => !directives.is_empty(),
-            Some(before) => is_long(before) || is_long(item) || before.keyword != item.keyword,
+            Some((kind, was_long)) => was_long || is_long || kind != *keyword,
         };
         if apart {
             out.push('\n');
         }
-        out.push_str(&item.text);
+        out.push_str(text);
+        before = Some((*keyword, is_long));
     }
     out
 }
@@ -458,13 +551,8 @@ struct Control {
 const NAME: &str = "autoLOD";
 
 impl Control {
-    fn new(
-        source: &Source,
-        text: &Text<'_>,
-        module: &Module,
-        form: Form,
-        names: &mut Names,
-    ) -> Result<Self> {
+    fn new(body: &Body<'_>, form: Form, names: &mut Names) -> Result<Self> {
+        let (source, text, module) = (body.source, &body.text, body.module);
         if let Some(own) = Self::own(module) {
             return Ok(own);
         }

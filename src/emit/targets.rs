@@ -169,7 +169,7 @@ fn metal(module: &Module, info: &ModuleInfo) -> std::result::Result<String, Stri
     resources.immediates_buffer = next(&mut buffers);
     resources.sizes_buffer = next(&mut buffers);
     let options = msl::Options {
-        lang_version: (2, 0),
+        lang_version: (2, 1),
         per_entry_point_map: module
             .entry_points
             .iter()
