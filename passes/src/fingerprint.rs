@@ -148,6 +148,12 @@ impl Declared {
         declared
     }
 
+    /// Takes in a type that was added to the module.
+    pub(crate) fn add_type(&mut self, module: &Module, ty: Handle<Type>) {
+        let hash = self.of_type(module, &module.types[ty]);
+        self.types.push(hash);
+    }
+
     fn of_type(&self, module: &Module, ty: &Type) -> u64 {
         let mut words = Words::new();
         match &ty.inner {
@@ -297,33 +303,46 @@ pub(crate) fn of(module: &Module) -> Fingerprint {
     let mut words = Words::new();
     for entry in &module.entry_points {
         (entry.stage, entry.early_depth_test, entry.workgroup_size).hash(&mut words);
-        let mut walk = Canonical {
-            declared: &declared,
-            function: &entry.function,
-            keys: vec![0; entry.function.expressions.len()],
-            locals: vec![0; entry.function.local_variables.len()],
-            met: 0,
-            computed: 0,
-            words: &mut words,
-        };
-        walk.interface();
-        walk.block(&entry.function.body);
+        take_in(&declared, &entry.function, &mut words);
     }
     Fingerprint(words.bytes16())
 }
 
-/// A walk over a body that numbers values and locals as they are met.
+/// The fingerprint of a function over the declarations of a module.
+pub(crate) fn of_function(module: &Module, function: &Function) -> Fingerprint {
+    let mut words = Words::new();
+    take_in(&Declared::of(module), function, &mut words);
+    Fingerprint(words.bytes16())
+}
+
+fn take_in(declared: &Declared, function: &Function, words: &mut Words) {
+    let mut walk = Canonical {
+        declared,
+        function,
+        keys: vec![0; function.expressions.len()],
+        locals: vec![0; function.local_variables.len()],
+        blocks: 0,
+        statements: 0,
+        words,
+    };
+    walk.interface();
+    walk.name_locals();
+    walk.block(&function.body);
+}
+
+/// A walk over a body. A value is known by what it is made of and by the block that computes it, so
+/// that the order of values in a block does not matter; what is loaded from memory that may change is
+/// known by the number of statements before it, too.
 struct Canonical<'a> {
     declared: &'a Declared,
     function: &'a Function,
-    /// For each expression, what its users hash: its number when it is emitted, else its content; 0 when
-    /// it was not met.
+    /// For each expression, what its users hash; 0 when it was not met.
     keys: Vec<u64>,
+    /// For each local variable, what pointers to it hash.
     locals: Vec<u64>,
-    /// Locals met so far.
-    met: u64,
-    /// Values computed so far.
-    computed: u64,
+    /// The number of the block that is walked.
+    blocks: u64,
+    statements: u64,
     words: &'a mut Words,
 }
 
@@ -339,61 +358,76 @@ impl Canonical<'_> {
         }
     }
 
+    /// Numbers local variables in the order in which statements touch them.
+    fn name_locals(&mut self) {
+        let mut order = Vec::new();
+        operands::walk(&self.function.body, &mut |statement| {
+            operands::each_of_statement(statement, |operand| {
+                order.extend(root(&self.function.expressions, operand));
+            });
+        });
+        let rest = self.function.local_variables.iter().map(|(local, _)| local);
+        let mut met = 0;
+        for (at, local) in order.iter().copied().chain(rest).enumerate() {
+            if self.locals[local.index()] == 0 {
+                let mut words = Words::new();
+                // What nothing stores to is known by what it begins with.
+                met += u64::from(at < order.len());
+                words.word(if at < order.len() { met } else { 0 });
+                let variable = &self.function.local_variables[local];
+                words.word(self.declared.ty(variable.ty));
+                if let Some(init) = variable.init {
+                    words.word(self.key(init));
+                }
+                self.locals[local.index()] = words.finish() | 1;
+            }
+        }
+    }
+
     fn key(&mut self, value: Handle<Expression>) -> u64 {
         if self.keys[value.index()] == 0 {
             // Not emitted, or part of a constant.
-            let expression = &self.function.expressions[value];
-            operands::each(expression, |operand| {
-                self.key(operand);
-            });
-            self.keys[value.index()] = match expression {
-                Expression::LocalVariable(local) => self.local(*local),
-                other => self
-                    .declared
-                    .expression(other, |operand| self.keys[operand.index()]),
-            };
+            self.keys[value.index()] = self.content(value) | 1;
         }
         self.keys[value.index()]
     }
 
-    fn local(&mut self, local: Handle<LocalVariable>) -> u64 {
-        if self.locals[local.index()] == 0 {
-            self.met += 1;
-            let mut words = Words::new();
-            words.word(self.met);
-            let variable = &self.function.local_variables[local];
-            words.word(self.declared.ty(variable.ty));
-            if let Some(init) = variable.init {
-                words.word(self.key(init));
-            }
-            self.locals[local.index()] = words.finish() | 1;
+    fn content(&mut self, value: Handle<Expression>) -> u64 {
+        let expression = &self.function.expressions[value];
+        if let Expression::LocalVariable(local) = expression {
+            return self.locals[local.index()];
         }
-        self.locals[local.index()]
+        operands::each(expression, |operand| {
+            self.key(operand);
+        });
+        self.declared
+            .expression(expression, |operand| self.keys[operand.index()])
     }
 
-    fn computed(&mut self, value: Handle<Expression>) {
-        self.computed += 1;
-        let mut number = Words::new();
-        number.word(self.computed);
-        self.keys[value.index()] = number.finish() | 1;
+    fn computed(&mut self, value: Handle<Expression>, block: u64) {
+        let mut words = Words::new();
+        words.word(self.content(value));
+        words.word(block);
+        if matches!(
+            self.function.expressions[value],
+            Expression::Load { .. } | Expression::ImageLoad { .. }
+        ) {
+            words.word(self.statements);
+        }
+        self.keys[value.index()] = words.finish() | 1;
     }
 
     fn block(&mut self, block: &Block) {
+        self.blocks += 1;
+        let number = self.blocks;
         for statement in block {
             if let Statement::Emit(range) = statement {
                 for value in range.clone() {
-                    let expression = &self.function.expressions[value];
-                    operands::each(expression, |operand| {
-                        self.key(operand);
-                    });
-                    let hash = self
-                        .declared
-                        .expression(expression, |operand| self.keys[operand.index()]);
-                    self.words.word(hash);
-                    self.computed(value);
+                    self.computed(value, number);
                 }
                 continue;
             }
+            self.statements += 1;
             discriminant(statement).hash(self.words);
             match statement {
                 Statement::Switch { cases, .. } => {
@@ -427,7 +461,8 @@ impl Canonical<'_> {
                 self.operands(statement);
             }
             if let Some(result) = operands::result(statement) {
-                self.computed(result);
+                self.words.word(self.statements);
+                self.keys[result.index()] = self.statements;
             }
         }
     }
@@ -438,6 +473,14 @@ impl Canonical<'_> {
             self.words.word(key);
         });
     }
+}
+
+/// The local variable that a pointer leads into.
+fn root(
+    expressions: &naga::Arena<Expression>,
+    pointer: Handle<Expression>,
+) -> Option<Handle<LocalVariable>> {
+    crate::normalize::forward::root(expressions, pointer)
 }
 
 #[cfg(test)]

@@ -12,6 +12,9 @@ pub mod edit;
 pub mod facts;
 mod fingerprint;
 mod flow;
+mod fold;
+mod live;
+pub mod normalize;
 pub mod op_removal;
 pub mod operands;
 mod places;
@@ -23,6 +26,7 @@ pub mod texture_removal;
 pub use cost::Work;
 pub use edit::{Edit, New};
 pub use facts::Facts;
+pub use normalize::{NormalizeError, normalize};
 pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
