@@ -3,6 +3,9 @@
 //! Both come from `.ci/run`. Where one is missing its tests say `SKIPPED` aloud, and fail when `CI` is set,
 //! so that a machine that lost it cannot pass in silence.
 
+use lodc::emit::{self, EmitLevel, Form, Output, Target};
+use lodc::front::Source;
+use lodc_passes::{Facts, PASSES, Shader, normalize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -130,6 +133,85 @@ fn spirv(module: &naga::Module, info: &naga::valid::ModuleInfo) -> Vec<u32> {
         .expect("naga writes SPIR-V of what it validated")
 }
 
+/// A shader after `count` changes that need no facts, spread over what can be changed.
+fn simplified(base: &Shader, count: usize) -> Shader {
+    let facts = Facts::default();
+    let mut shader = base.clone();
+    for step in 0..count {
+        let all = PASSES.iter().flat_map(|pass| {
+            let candidates = pass.candidates(&shader, &facts).into_iter();
+            candidates.map(move |candidate| (pass, candidate))
+        });
+        let mut all: Vec<_> = all.collect();
+        if all.is_empty() {
+            break;
+        }
+        let (pass, candidate) = all.swap_remove(step * 7919 % all.len());
+        shader = pass.apply(&shader, &candidate);
+    }
+    shader
+}
+
+/// The levels that a shader is emitted with here: its normal form, and two simpler ones.
+fn levels(source: &Source) -> Vec<EmitLevel> {
+    let base = normalize(
+        &source.module,
+        source.vertex.as_deref(),
+        &source.fragment,
+        100_000,
+    )
+    .unwrap_or_else(|e| panic!("{}: {e}", source.name));
+    [0, 3, 12]
+        .iter()
+        .enumerate()
+        .map(|(at, &count)| EmitLevel {
+            autolod: 0.5 + at as f32,
+            shader: simplified(&base, count),
+            distance: 2.0,
+            error: 0.01,
+            cost: 0.5,
+            says: format!("{count} changes"),
+        })
+        .collect()
+}
+
+/// Shows every shader of a folder to the judges in every form, with levels.
+fn emitted(folder: &str) {
+    let mut wgsl = Vec::new();
+    for (name, text) in shaders(folder) {
+        let source = Source::parse(&format!("{name}.wgsl"), text).unwrap_or_else(|e| panic!("{e}"));
+        let levels = levels(&source);
+        for form in [Form::Override, Form::Uniform, Form::Files] {
+            let write = |target| emit::emit(&source, &levels, Output { form, target });
+            for (path, bytes) in write(Target::Wgsl).unwrap_or_else(|e| panic!("{e}")) {
+                let stem = path.file_stem().expect("a name").to_string_lossy();
+                let text = String::from_utf8(bytes).expect("WGSL is text");
+                wgsl.push((format!("{stem}_{}", form.name()), text));
+            }
+            // Only WGSL carries overrides, also those of the author that choose a level.
+            let Ok(files) = write(Target::Spirv) else {
+                let overrides = form == Form::Override || !source.module.overrides.is_empty();
+                assert!(overrides, "{name} has no {} in SPIR-V", form.name());
+                continue;
+            };
+            for (path, bytes) in files {
+                let words: Vec<u32> = bytes
+                    .chunks_exact(4)
+                    .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+                    .collect();
+                let test = format!("emitted_{folder}_{}", form.name());
+                let module = path.display().to_string();
+                if let Some(complaint) = spirv_val(&test, &module, &words) {
+                    assert!(complaint.is_empty(), "{complaint}");
+                }
+            }
+        }
+    }
+    if let Some(errors) = tint(&format!("tint_emitted_{folder}"), &wgsl) {
+        assert!(errors.is_empty(), "{errors:#?}");
+    }
+}
+
 /// Uniform control flow is what Tint checks and naga does not: if this passes, Tint is not looking.
 #[test]
 fn tint_refuses_a_sample_under_a_varying_branch() {
@@ -186,4 +268,14 @@ fn judges_accept_the_materials() {
 #[test]
 fn judges_accept_the_adversarial_shaders() {
     judged("shaders");
+}
+
+#[test]
+fn judges_accept_what_is_emitted_for_the_materials() {
+    emitted("materials");
+}
+
+#[test]
+fn judges_accept_what_is_emitted_for_the_adversarial_shaders() {
+    emitted("shaders");
 }
