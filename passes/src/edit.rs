@@ -2,15 +2,23 @@
 //!
 //! Old handles stay valid while the edit is described. [`Edit::finish`] rebuilds the function in body
 //! order with an old-to-new map, so that operands come before users and each value is computed where
-//! it is available; what nobody needs any more is left out.
+//! it is available, and brings it to normal form again.
 
+use crate::live;
+use crate::normalize::forward::{self, Changes, Origin};
+use crate::normalize::names;
 use crate::operands::{self, User};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
-    Arena, Block, Expression, Function, Handle, Literal, Range, Scalar, Span, Statement, Type,
-    TypeInner, VectorSize,
+    Arena, Block, EntryPoint, Expression, Function, Handle, Literal, Module, Scalar, Span,
+    Statement, Type, TypeInner, VectorSize,
 };
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Rounds of rebuilding after which an edit is done, should there still be something to find.
+const ROUNDS: usize = 8;
 
 /// What a value is replaced by.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +35,7 @@ pub struct Edit<'a> {
     shader: &'a Shader,
     stage: Stage,
     entry: usize,
-    module: naga::Module,
+    module: Module,
     /// The old values, and behind them those that were added.
     expressions: Arena<Expression>,
     /// The paths of the added values.
@@ -47,7 +55,7 @@ impl<'a> Edit<'a> {
             shader,
             stage,
             entry,
-            module: shader.module.clone(),
+            module: without(&shader.module, entry),
             expressions: shader.module.entry_points[entry]
                 .function
                 .expressions
@@ -173,315 +181,198 @@ impl<'a> Edit<'a> {
         users.all(|user| places.reaches(value, *user))
     }
 
-    /// The shader with the changes made: rebuilt in body order, without what nobody needs any more.
+    /// The shader with the changes made: rebuilt in body order and in normal form again, with constants
+    /// folded, and without what nobody needs any more.
     ///
     /// # Panics
     /// When a replacement is not computed where it is used: [`available`](Self::available) tells
     /// beforehand.
     pub fn finish(mut self) -> Shader {
         let old = self.function();
-        let mut rebuild = Rebuild {
-            edit: &self,
-            new: Arena::new(),
-            ids: Vec::new(),
-            taken: BTreeSet::new(),
-            map: vec![None; self.expressions.len()],
-            scope: Vec::new(),
-            needed: vec![false; self.expressions.len()],
-            number: 0,
-            pending: None,
-            origins: Vec::new(),
-        };
-        rebuild.taken = self.shader.ids[self.entry]
-            .iter()
-            .map(|id| id.path().to_owned())
-            .collect();
-        rebuild.mark(&old.body);
-        let mut locals = old.local_variables.clone();
-        for (_, local) in locals.iter_mut() {
-            if let Some(init) = &mut local.init {
-                *init = rebuild.constant_tree(*init);
-            }
-        }
-        rebuild.number = 0;
-        let body = rebuild.block(&old.body);
-        let Rebuild {
-            new, ids, origins, ..
-        } = rebuild;
-        let mut named = naga::FastIndexMap::default();
-        for ((value, _), origin) in new.iter().zip(origins) {
-            if let Some(name) = old.named_expressions.get(&origin) {
-                named.insert(value, name.clone());
-            }
-        }
-        let function = Function {
-            name: old.name.clone(),
-            arguments: old.arguments.clone(),
-            result: old.result.clone(),
-            local_variables: locals,
-            expressions: new,
-            named_expressions: named,
-            body,
-            diagnostic_filter_leaf: old.diagnostic_filter_leaf,
-        };
-        self.module.entry_points[self.entry].function = function;
-        let mut all = self.shader.ids.clone();
-        all[self.entry] = ids;
-        Shader::new(self.module, all)
-    }
-}
-
-/// A function being rebuilt.
-struct Rebuild<'e, 'a> {
-    edit: &'e Edit<'a>,
-    new: Arena<Expression>,
-    ids: Vec<ValueId>,
-    /// The old value of each new one.
-    origins: Vec<Handle<Expression>>,
-    taken: BTreeSet<String>,
-    map: Vec<Option<Handle<Expression>>>,
-    /// Old values that were computed in the open blocks, to be forgotten when these close.
-    scope: Vec<Handle<Expression>>,
-    needed: Vec<bool>,
-    /// The number of the next statement in walking order.
-    number: usize,
-    /// The first and last new expression that no `Emit` covers yet.
-    pending: Option<(Handle<Expression>, Handle<Expression>)>,
-}
-
-impl Rebuild<'_, '_> {
-    fn operand(&self, user: User, old: Handle<Expression>) -> Handle<Expression> {
-        if let Some(new) = self.edit.replaced_for.get(&(user, old)) {
-            return self.replaced(*new);
-        }
-        self.replaced(old)
-    }
-
-    fn replaced(&self, mut old: Handle<Expression>) -> Handle<Expression> {
-        let mut steps = 0;
-        while let Some(new) = self.edit.replaced.get(&old) {
-            old = *new;
-            steps += 1;
-            assert!(
-                steps <= self.edit.replaced.len(),
-                "a value is replaced by itself"
-            );
-        }
-        old
-    }
-
-    /// Marks what the statements of a block need.
-    fn mark(&mut self, block: &Block) {
-        let mut roots = Vec::new();
-        let mut number = self.number;
-        operands::walk(block, &mut |statement| {
-            operands::each_of_statement(statement, |operand| {
-                roots.push((User::Statement(number), operand));
-            });
-            number += 1;
-        });
-        let mut open: Vec<_> = roots
-            .into_iter()
-            .map(|(user, operand)| self.operand(user, operand))
-            .collect();
-        while let Some(value) = open.pop() {
-            if !std::mem::replace(&mut self.needed[value.index()], true) {
-                operands::each(&self.edit.expressions[value], |operand| {
-                    open.push(self.operand(User::Value(value), operand));
-                });
-            }
-        }
-    }
-
-    fn append(
-        &mut self,
-        expression: Expression,
-        old: Handle<Expression>,
-        emit: bool,
-    ) -> Handle<Expression> {
-        let span = self.edit.expressions.get_span(old);
-        let new = self.new.append(expression, span);
-        let known = &self.edit.shader.ids[self.edit.entry];
-        let id = match known.get(old.index()) {
-            Some(id) => id.clone(),
-            None => {
-                let path = &self.edit.added[old.index() - known.len()];
-                let mut unique = path.clone();
-                let mut ordinal = 1;
-                while !self.taken.insert(unique.clone()) {
-                    ordinal += 1;
-                    unique = format!("{path}_{ordinal}");
+        let mut body = Cow::Borrowed(&old.body);
+        for ((user, value), new) in &self.replaced_for {
+            match *user {
+                User::Value(user) => {
+                    operands::each_mut(&mut self.expressions[user], |operand| {
+                        if operand == value {
+                            *operand = *new;
+                        }
+                    });
                 }
-                ValueId::new(unique, 0)
-            }
-        };
-        self.ids.push(id);
-        self.origins.push(old);
-        self.map[old.index()] = Some(new);
-        if emit {
-            let first = self.pending.map_or(new, |(first, _)| first);
-            self.pending = Some((first, new));
-        }
-        new
-    }
-
-    /// An initial value of a local variable: constant, and outside of every block.
-    fn constant_tree(&mut self, old: Handle<Expression>) -> Handle<Expression> {
-        let expression = operands::map(&self.edit.expressions[old], |operand| {
-            self.constant_tree(operand)
-        });
-        let new = self.append(expression, old, false);
-        self.map[old.index()] = None;
-        new
-    }
-
-    fn flush(&mut self, block: &mut Block) {
-        if let Some((first, last)) = self.pending.take() {
-            block.push(
-                Statement::Emit(Range::new_from_bounds(first, last)),
-                Span::UNDEFINED,
-            );
-        }
-    }
-
-    /// The new handle of an old value as `user` sees it; added values and those that need no
-    /// `Emit` are made now.
-    fn get(
-        &mut self,
-        block: &mut Block,
-        user: User,
-        old: Handle<Expression>,
-    ) -> Handle<Expression> {
-        let old = self.operand(user, old);
-        if let Some(new) = self.map[old.index()] {
-            return new;
-        }
-        let expression = &self.edit.expressions[old];
-        let added = old.index() >= self.edit.shader.ids[self.edit.entry].len();
-        if expression.needs_pre_emit() {
-            self.flush(block);
-            return self.append(expression.clone(), old, false);
-        }
-        assert!(
-            added,
-            "{} is used where it is not computed",
-            self.edit.shader.ids[self.edit.entry][old.index()]
-        );
-        self.compute(block, old)
-    }
-
-    fn compute(&mut self, block: &mut Block, old: Handle<Expression>) -> Handle<Expression> {
-        let mut expression = self.edit.expressions[old].clone();
-        operands::each_mut(&mut expression, |operand| {
-            *operand = self.get(block, User::Value(old), *operand);
-        });
-        let new = self.append(expression, old, true);
-        self.scope.push(old);
-        new
-    }
-
-    fn block(&mut self, old: &Block) -> Block {
-        let open = self.scope.len();
-        let block = self.statements(old);
-        self.close(open);
-        block
-    }
-
-    fn close(&mut self, open: usize) {
-        for value in self.scope.drain(open..) {
-            self.map[value.index()] = None;
-        }
-    }
-
-    fn statements(&mut self, old: &Block) -> Block {
-        let mut block = Block::new();
-        for (statement, span) in old.span_iter() {
-            let user = User::Statement(self.number);
-            self.number += 1;
-            if let Statement::Emit(range) = statement {
-                for value in range.clone() {
-                    if self.needed[value.index()] && self.map[value.index()].is_none() {
-                        self.compute(&mut block, value);
-                    }
-                }
-                continue;
-            }
-            let statement = match statement {
-                Statement::Block(inner) => {
-                    self.flush(&mut block);
-                    Statement::Block(self.block(inner))
-                }
-                Statement::If {
-                    condition,
-                    accept,
-                    reject,
-                } => {
-                    let condition = self.get(&mut block, user, *condition);
-                    self.flush(&mut block);
-                    Statement::If {
-                        condition,
-                        accept: self.block(accept),
-                        reject: self.block(reject),
-                    }
-                }
-                Statement::Switch { selector, cases } => {
-                    let selector = self.get(&mut block, user, *selector);
-                    self.flush(&mut block);
-                    let cases = cases
-                        .iter()
-                        .map(|case| naga::SwitchCase {
-                            value: case.value,
-                            body: self.block(&case.body),
-                            fall_through: case.fall_through,
-                        })
-                        .collect();
-                    Statement::Switch { selector, cases }
-                }
-                Statement::Loop {
-                    body,
-                    continuing,
-                    break_if,
-                } => {
-                    self.flush(&mut block);
-                    // What the body computes can be seen in the continuing block.
-                    let open = self.scope.len();
-                    let body = self.statements(body);
-                    let mut continuing = self.statements(continuing);
-                    let break_if = break_if.map(|c| self.get(&mut continuing, user, c));
-                    self.flush(&mut continuing);
-                    self.close(open);
-                    Statement::Loop {
-                        body,
-                        continuing,
-                        break_if,
-                    }
-                }
-                other => {
-                    let mut new = other.clone();
-                    let mut results = Vec::new();
+                User::Statement(number) => {
+                    let statement = nth(body.to_mut(), &mut { number });
+                    let statement = statement.expect("the user is a statement of the body");
                     operands::each_mut_of_statement(
-                        &mut new,
-                        |operand| *operand = self.get(&mut block, user, *operand),
-                        |result| results.push(*result),
-                    );
-                    self.flush(&mut block);
-                    for old in results {
-                        let expression = self.edit.expressions[old].clone();
-                        self.append(expression, old, false);
-                        self.scope.push(old);
-                    }
-                    operands::each_mut_of_statement(
-                        &mut new,
+                        statement,
+                        |operand| {
+                            if operand == value {
+                                *operand = *new;
+                            }
+                        },
                         |_| {},
-                        |result| *result = self.map[result.index()].unwrap_or(*result),
                     );
-                    new
                 }
-            };
-            self.flush(&mut block);
-            block.push(statement, *span);
+            }
         }
-        self.flush(&mut block);
-        block
+        let base = &self.shader.ids[self.entry];
+        let changes = Changes {
+            expressions: &self.expressions,
+            body: &body,
+            first_added: base.len(),
+            replaced: &self.replaced,
+        };
+        let mut rebuilt = forward::rebuild(&mut self.module, old, &changes);
+        let mut sources: Vec<Source> = rebuilt.origins.iter().map(|o| Source::of(*o)).collect();
+        let mut again = rebuilt.again;
+        let mut rounds = 0;
+        let function = loop {
+            let kept = live::keep_needed(&rebuilt.function);
+            let origins = kept.origins.iter();
+            sources = origins.map(|old| sources[old.index()]).collect();
+            again |= kept.again;
+            rounds += 1;
+            if !again || rounds == ROUNDS {
+                break kept.function;
+            }
+            rebuilt = forward::rebuild(
+                &mut self.module,
+                &kept.function,
+                &Changes::none(&kept.function),
+            );
+            sources = rebuilt
+                .origins
+                .iter()
+                .map(|origin| match origin {
+                    Origin::Value(old) => sources[old.index()],
+                    other => Source::of(*other),
+                })
+                .collect();
+            again = rebuilt.again;
+        };
+        let mut ids = self.shader.ids.clone();
+        ids[self.entry] = self.ids(&function, &sources);
+        self.module.entry_points[self.entry].function = function;
+        Shader::new(self.module, ids)
+    }
+
+    /// The ids of the new values. Old values keep theirs; a second copy of one, and what was made on the
+    /// way, gets an ordinal behind a `~`, which no path of the normal form has.
+    fn ids(&self, function: &Function, sources: &[Source]) -> Vec<ValueId> {
+        let base = &self.shader.ids[self.entry];
+        let entry = &self.shader.module.entry_points[self.entry].name;
+        let mut seen = vec![false; self.expressions.len()];
+        let mut taken: Option<BTreeSet<Arc<str>>> = None;
+        let mut fresh = |stem: &str| {
+            let taken = taken.get_or_insert_with(|| {
+                let marked = base.iter().filter(|id| id.path().contains('~'));
+                marked.map(|id| id.path().into()).collect()
+            });
+            let mut ordinal = 1;
+            loop {
+                ordinal += 1;
+                let path: Arc<str> = format!("{stem}~{ordinal}").into();
+                if taken.insert(path.clone()) {
+                    return ValueId::new(path, 0);
+                }
+            }
+        };
+        let values = function.expressions.iter().zip(sources);
+        values
+            .map(|((_, expression), source)| {
+                if let Expression::Literal(literal) = expression {
+                    return ValueId::new(names::literal_path(entry, *literal), 0);
+                }
+                match *source {
+                    Source::Value(at) => {
+                        let first = !std::mem::replace(&mut seen[at], true);
+                        match base.get(at) {
+                            Some(id) if first => id.clone(),
+                            Some(id) => fresh(id.path()),
+                            None => {
+                                let path = &self.added[at - base.len()];
+                                let is_free = || base.iter().all(|id| id.path() != path);
+                                if first && is_free() {
+                                    ValueId::new(path.as_str(), 0)
+                                } else {
+                                    fresh(path)
+                                }
+                            }
+                        }
+                    }
+                    Source::Made => fresh(&format!("{entry}.part")),
+                }
+            })
+            .collect()
+    }
+}
+
+/// Where a new value comes from: an old or added value, by its index, or nowhere.
+#[derive(Clone, Copy)]
+enum Source {
+    Value(usize),
+    Made,
+}
+
+impl Source {
+    fn of(origin: Origin) -> Self {
+        match origin {
+            Origin::Value(old) => Self::Value(old.index()),
+            Origin::Local(_) | Origin::Made => Self::Made,
+        }
+    }
+}
+
+/// The statement of that number in the order of [`operands::walk`], to be changed.
+fn nth<'b>(block: &'b mut Block, number: &mut usize) -> Option<&'b mut Statement> {
+    for statement in block.iter_mut() {
+        if *number == 0 {
+            return Some(statement);
+        }
+        *number -= 1;
+        let inner: Vec<&mut Block> = match statement {
+            Statement::Block(inner) => vec![inner],
+            Statement::If { accept, reject, .. } => vec![accept, reject],
+            Statement::Loop {
+                body, continuing, ..
+            } => vec![body, continuing],
+            Statement::Switch { cases, .. } => cases.iter_mut().map(|c| &mut c.body).collect(),
+            _ => Vec::new(),
+        };
+        for inner in inner {
+            if let Some(found) = nth(inner, number) {
+                return Some(found);
+            }
+        }
+    }
+    None
+}
+
+/// Everything of a module but the function of one of its entry points.
+fn without(module: &Module, entry: usize) -> Module {
+    let entry_points = module.entry_points.iter().enumerate().map(|(at, point)| {
+        let function = match at == entry {
+            true => Function::default(),
+            false => point.function.clone(),
+        };
+        EntryPoint {
+            name: point.name.clone(),
+            workgroup_size_overrides: point.workgroup_size_overrides,
+            mesh_info: point.mesh_info.clone(),
+            function,
+            ..*point
+        }
+    });
+    Module {
+        types: module.types.clone(),
+        special_types: module.special_types.clone(),
+        constants: module.constants.clone(),
+        overrides: module.overrides.clone(),
+        global_variables: module.global_variables.clone(),
+        global_expressions: module.global_expressions.clone(),
+        functions: module.functions.clone(),
+        entry_points: entry_points.collect(),
+        diagnostic_filters: module.diagnostic_filters.clone(),
+        diagnostic_filter_leaf: module.diagnostic_filter_leaf,
+        doc_comments: module.doc_comments.clone(),
     }
 }

@@ -88,6 +88,7 @@ const CHEAP: u32 = 12;
 struct Forward<'a> {
     module: &'a mut Module,
     old: &'a Function,
+    expressions: &'a Arena<Expression>,
     replaced: &'a BTreeMap<Handle<Expression>, Handle<Expression>>,
     /// How many of the old expressions were not added by an edit.
     first_added: usize,
@@ -122,24 +123,52 @@ struct Forward<'a> {
     again: bool,
 }
 
-/// Rebuilds `old`, a function of `module` without calls and early returns. Expressions from
-/// `first_added` on are not in its body; they are computed where they are first used. Users of a value
-/// in `replaced` use the other one.
+/// What is changed in a function while it is rebuilt.
+#[derive(Clone, Copy)]
+pub(crate) struct Changes<'a> {
+    /// The old expressions, with other operands where these are replaced for one user, and the added
+    /// ones behind them.
+    pub(crate) expressions: &'a Arena<Expression>,
+    /// The old body, with other operands where these are replaced for one user.
+    pub(crate) body: &'a Block,
+    /// How many old expressions there are; those behind them are in no `Emit`, and are computed where
+    /// they are first used.
+    pub(crate) first_added: usize,
+    /// Users of a value use the other one.
+    pub(crate) replaced: &'a BTreeMap<Handle<Expression>, Handle<Expression>>,
+}
+
+impl<'a> Changes<'a> {
+    /// Nothing is changed.
+    pub(crate) fn none(function: &'a Function) -> Self {
+        static NONE: BTreeMap<Handle<Expression>, Handle<Expression>> = BTreeMap::new();
+        Self {
+            expressions: &function.expressions,
+            body: &function.body,
+            first_added: function.expressions.len(),
+            replaced: &NONE,
+        }
+    }
+}
+
+/// Rebuilds `old`, a function of `module` without calls and early returns, with changes.
 ///
 /// # Panics
 /// When a replacement is not computed where it is used.
-pub(crate) fn rebuild(
-    module: &mut Module,
-    old: &Function,
-    first_added: usize,
-    replaced: &BTreeMap<Handle<Expression>, Handle<Expression>>,
-) -> Rebuilt {
+pub(crate) fn rebuild(module: &mut Module, old: &Function, changes: &Changes) -> Rebuilt {
     let declared = Declared::of(module);
-    let count = old.expressions.len();
+    let &Changes {
+        expressions,
+        body,
+        first_added,
+        replaced,
+    } = changes;
+    let count = expressions.len();
     let mut forward = Forward {
-        tracked: tracked(module, old),
+        tracked: tracked(module, old, expressions, body),
         module,
         old,
+        expressions,
         replaced,
         first_added,
         declared,
@@ -167,7 +196,7 @@ pub(crate) fn rebuild(
         again: false,
     };
     forward.start();
-    forward.statements(&old.body);
+    forward.statements(body);
     forward.flush();
     let mut names = naga::FastIndexMap::default();
     for (value, origin) in forward.new.iter().zip(&forward.origins) {
@@ -213,7 +242,12 @@ pub(crate) fn root(
 
 /// For each local variable, whether its value is followed: scalars, vectors and matrices that are only
 /// loaded and stored.
-fn tracked(module: &Module, function: &Function) -> Vec<bool> {
+fn tracked(
+    module: &Module,
+    function: &Function,
+    expressions: &Arena<Expression>,
+    body: &Block,
+) -> Vec<bool> {
     let mut tracked: Vec<bool> = function
         .local_variables
         .iter()
@@ -224,9 +258,9 @@ fn tracked(module: &Module, function: &Function) -> Vec<bool> {
             )
         })
         .collect();
-    operands::walk(&function.body, &mut |statement| {
+    operands::walk(body, &mut |statement| {
         let mut lose = |operand: Handle<Expression>| {
-            if let Some(local) = root(&function.expressions, operand) {
+            if let Some(local) = root(expressions, operand) {
                 tracked[local.index()] = false;
             }
         };
@@ -274,7 +308,7 @@ impl Forward<'_> {
 
     fn span(&self, origin: Origin) -> Span {
         match origin {
-            Origin::Value(old) => self.old.expressions.get_span(old),
+            Origin::Value(old) => self.expressions.get_span(old),
             Origin::Local(local) => self.locals.get_span(local),
             Origin::Made => Span::UNDEFINED,
         }
@@ -604,7 +638,7 @@ impl Forward<'_> {
         if let Some(value) = self.map[old.index()] {
             return value;
         }
-        let expression = &self.old.expressions[old];
+        let expression = &self.expressions[old];
         assert!(
             expression.needs_pre_emit() || old.index() >= self.first_added,
             "the old value {old:?}, {expression:?}, is used where it is not computed"
@@ -615,10 +649,10 @@ impl Forward<'_> {
     /// Computes an old value here.
     fn make(&mut self, old: Handle<Expression>) -> Value {
         let origin = Origin::Value(old);
-        let function = self.old;
-        let value = self.value(&function.expressions[old], origin);
+        let expressions = self.expressions;
+        let value = self.value(&expressions[old], origin);
         self.map[old.index()] = Some(value);
-        if !function.expressions[old].needs_pre_emit() {
+        if !expressions[old].needs_pre_emit() {
             self.mapped.push(old);
         }
         value
@@ -1112,9 +1146,9 @@ impl Forward<'_> {
 
     /// The value of an initialiser, computed here.
     fn initial(&mut self, init: Handle<Expression>) -> Value {
-        let function = self.old;
+        let expressions = self.expressions;
         let mut inner = Vec::new();
-        operands::each(&function.expressions[init], |operand| inner.push(operand));
+        operands::each(&expressions[init], |operand| inner.push(operand));
         let before: Vec<_> = inner
             .iter()
             .map(|operand| {
@@ -1122,7 +1156,7 @@ impl Forward<'_> {
                 self.map[operand.index()].replace(value)
             })
             .collect();
-        let value = self.value(&function.expressions[init], Origin::Value(init));
+        let value = self.value(&expressions[init], Origin::Value(init));
         for (operand, before) in inner.into_iter().zip(before) {
             self.map[operand.index()] = before;
         }
@@ -1320,16 +1354,14 @@ impl Forward<'_> {
             let (constant, origin) = self.constants[index].clone();
             return self.materialise(index, &constant, origin, false);
         }
-        let function = self.old;
-        let expression = operands::map(&function.expressions[init], |operand| {
-            self.initialiser(operand)
-        });
+        let expressions = self.expressions;
+        let expression = operands::map(&expressions[init], |operand| self.initialiser(operand));
         self.append_constant(expression, Origin::Value(init), false)
     }
 
     /// An initialiser as a constant, if it is a scalar, vector or matrix.
     fn constant_tree(&mut self, init: Handle<Expression>) -> Option<Value> {
-        let constant = fold::tree(self.module, &self.old.expressions, init)?;
+        let constant = fold::tree(self.module, self.expressions, init)?;
         Some(self.constant(constant, Origin::Value(init)))
     }
 
@@ -1471,7 +1503,7 @@ impl Forward<'_> {
                 );
                 if let Some(result) = operands::result(other) {
                     self.flush();
-                    let expression = self.old.expressions[result].clone();
+                    let expression = self.expressions[result].clone();
                     let value = self.append(expression, Origin::Value(result));
                     // The statement computes it, not an `Emit`.
                     self.pending = None;
@@ -1786,10 +1818,10 @@ impl Forward<'_> {
         span: Span,
     ) -> Flow {
         self.flush();
-        let function = self.old;
+        let expressions = self.expressions;
         for block in [body, continuing] {
             let state = &mut self.state;
-            stores(&function.expressions, block, &mut |local| {
+            stores(expressions, block, &mut |local| {
                 state[local] = Known::Memory;
             });
         }

@@ -14,10 +14,9 @@ mod returns;
 mod split;
 
 use crate::{Shader, fingerprint, live};
-use forward::Origin;
+use forward::{Changes, Origin};
 use naga::{Expression, Function, Module, ShaderStage, Span};
 use names::Tag;
-use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -100,6 +99,7 @@ pub fn normalize(
             }
             before = now;
         }
+        tagged.name_loads();
         module.entry_points[entry].function = tagged.function;
         tags.push(tagged.tags);
     }
@@ -168,8 +168,7 @@ impl Tagged {
     }
 
     fn forward(&mut self, module: &mut Module) {
-        let count = self.function.expressions.len();
-        let rebuilt = forward::rebuild(module, &self.function, count, &BTreeMap::new());
+        let rebuilt = forward::rebuild(module, &self.function, &Changes::none(&self.function));
         let locals = rebuilt.function.local_variables.iter();
         self.locals = locals
             .map(|(local, variable)| match self.locals.get(local.index()) {
@@ -188,21 +187,25 @@ impl Tagged {
             .collect();
         self.function = rebuilt.function;
         // What a person called a variable, the values that it holds are called.
-        let loads = self.function.expressions.iter().zip(&rebuilt.origins);
-        let loads = loads.filter_map(|((value, expression), origin)| match origin {
-            Origin::Local(local) if !expression.needs_pre_emit() => Some((value, *local)),
-            _ => None,
-        });
-        let loads: Vec<_> = loads.collect();
-        for (value, local) in rebuilt.stored.into_iter().chain(loads) {
-            let tag = &self.locals[local.index()];
-            let named = tag.name.is_some() && tags[value.index()].name.is_none();
-            let own = &self.function.expressions[value];
-            if (named || tags[value.index()] == *tag) && !own.needs_pre_emit() {
-                tags[value.index()] = tag.clone();
+        for (value, local) in rebuilt.stored {
+            let tag = &mut tags[value.index()];
+            if tag.name.is_none() {
+                *tag = self.locals[local.index()].clone();
             }
         }
         self.tags = tags;
+    }
+
+    /// What is loaded from a variable is called like it, too.
+    fn name_loads(&mut self) {
+        for (value, expression) in self.function.expressions.iter() {
+            if let Expression::Load { pointer } = *expression
+                && let Expression::LocalVariable(local) = self.function.expressions[pointer]
+                && self.tags[value.index()].name.is_none()
+            {
+                self.tags[value.index()] = self.locals[local.index()].clone();
+            }
+        }
     }
 
     fn keep_needed(&mut self) {

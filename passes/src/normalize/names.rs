@@ -260,7 +260,7 @@ impl<'a> Naming<'a> {
                 let name = self.module.overrides[o].name.as_deref();
                 Some(format!("{entry}.{}", name.unwrap_or("override")))
             }
-            Expression::Literal(literal) => Some(format!("{entry}.{}", literal_text(literal))),
+            Expression::Literal(literal) => Some(literal_path(entry, literal)),
             Expression::AccessIndex { base, index } => {
                 let whole = self.place(base).or_else(|| self.named(base))?;
                 Some(format!("{whole}.{}", self.member(base, index)))
@@ -436,6 +436,11 @@ fn component(index: u32) -> &'static str {
 
 fn swizzle(pattern: &[SwizzleComponent]) -> String {
     pattern.iter().map(|c| component(*c as u32)).collect()
+}
+
+/// The path of a literal, which is the same wherever it is used.
+pub(crate) fn literal_path(entry: &str, literal: Literal) -> String {
+    format!("{entry}.{}", literal_text(literal))
 }
 
 fn literal_text(literal: Literal) -> String {
