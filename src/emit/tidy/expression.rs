@@ -289,9 +289,18 @@ fn plain_number(word: &str) -> String {
         .strip_suffix('f')
         .map(|digits| (digits, digits.parse::<f32>()))
     {
-        Some((digits, Ok(value))) if !digits.starts_with("0x") => format!("{value:?}f"),
+        Some((digits, Ok(value))) if !digits.starts_with("0x") => format!("{}f", decimal(value)),
         _ => word.to_owned(),
     }
+}
+
+/// The shortest decimal that is read back as the same number. The largest one's is above it before it is
+/// rounded, which Tint refuses: that one is written in full.
+fn decimal(value: f32) -> String {
+    if value.abs() == f32::MAX {
+        return format!("{:?}", f64::from(value));
+    }
+    format!("{value:?}")
 }
 
 /// A number without the suffix that its type can do without.
@@ -300,7 +309,7 @@ fn bare_number(word: &str) -> String {
         && !digits.starts_with("0x")
         && let Ok(value) = digits.parse::<f32>()
     {
-        let text = format!("{value:?}");
+        let text = decimal(value);
         // Without a suffix it is read as an f64 first: both roundings must lead to the same f32.
         let same = text
             .parse::<f64>()
@@ -324,5 +333,8 @@ mod tests {
         assert_eq!(bare_number("0.1f"), "0.1");
         assert_eq!(bare_number("16777216f"), "16777216.0");
         assert_eq!(bare_number("7h"), "7h");
+        let largest = "340282350000000000000000000000000000000f";
+        assert_eq!(bare_number(largest), "3.4028234663852886e38");
+        assert_eq!(plain_number(largest), "3.4028234663852886e38f");
     }
 }
