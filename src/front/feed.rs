@@ -17,7 +17,7 @@ pub enum Feed {
     Uv,
     /// The unit tangent along increasing u; a fourth component is the sign of the bitangent.
     Tangent,
-    /// The bitangent along increasing v.
+    /// The bitangent: the normal times the tangent, with its sign; towards the top of the image.
     Bitangent,
     /// The sign of the bitangent alone.
     BitangentSign,

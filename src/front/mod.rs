@@ -19,7 +19,7 @@ pub use vertex_stage::VertexStage;
 
 use crate::{Diagnostic, Result};
 use naga::valid::ModuleInfo;
-use naga::{EntryPoint, Module, ShaderStage, Span};
+use naga::{EntryPoint, GlobalVariable, Handle, Module, ShaderStage, Span};
 use std::path::{Path, PathBuf};
 
 /// A shader as the user wrote it, parsed and validated, with the entry points that lodc works on.
@@ -103,6 +103,16 @@ impl Source {
         self.entry(ShaderStage::Vertex, self.vertex.as_deref()?)
     }
 
+    /// Where a variable of the module is declared: its name in the declaration.
+    pub fn variable(&self, variable: Handle<GlobalVariable>) -> Span {
+        let declared = self.module.global_variables.get_span(variable);
+        let name = self.module.global_variables[variable].name.as_deref();
+        declared
+            .to_range()
+            .and_then(|all| names::whole_word(&self.text, all, name?))
+            .map_or(declared, Span::from)
+    }
+
     fn entry(&self, stage: ShaderStage, name: &str) -> Option<(usize, &EntryPoint)> {
         let mut entries = self.module.entry_points.iter().enumerate();
         entries.find(|(_, e)| e.stage == stage && e.name == name)
@@ -184,7 +194,7 @@ pub fn read_text(path: &Path, kind: &str) -> Result<String> {
 }
 
 /// The name of a file in the same folder that the user may have meant.
-fn similar_file(path: &Path) -> Option<String> {
+pub(crate) fn similar_file(path: &Path) -> Option<String> {
     let wanted = path.file_name()?.to_str()?;
     let folder = match path.parent() {
         Some(parent) if parent != Path::new("") => parent,

@@ -1,3 +1,586 @@
 //! The scene: the views, distances, lights, uniforms, textures and mesh that errors are measured over.
+//!
+//! ```text
+//! TOML --file--> SceneFile --resolve, against the shader--> Scene --frames--> [Frame]
+//! ```
+//!
+//! What the file leaves out is told from names and types; each such inference is kept, to be printed.
+//! What nothing tells is an error that names the lines to add.
 
+mod attributes;
+mod buffers;
+pub mod camera;
+mod file;
+mod layout;
 pub mod mesh;
+pub mod objects;
+mod semantic;
+mod settings;
+mod textures;
+
+pub use buffers::{Uniform, Variation};
+pub use semantic::Semantic;
+pub use settings::{Output, ToneMapping};
+pub use textures::SceneTexture;
+
+use crate::eval::machine::{Bindings, Resource};
+use crate::eval::raster::{Attribute, Frame};
+use crate::front::{Source, VertexStage, read_text};
+use crate::{Diagnostic, Result};
+use buffers::{Buffer, Said};
+use camera::{Pose, Sphere};
+use file::Toml;
+use glam::{DMat4, DVec3};
+use lodc_passes::autolod;
+use mesh::Mesh;
+use naga::Span;
+use objects::Object;
+use settings::Settings;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Everything that pictures of a shader are made of, resolved against that shader.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The scene file's name as the user gave it; `None` without one.
+    pub name: Option<String>,
+    /// Which built-in object is drawn.
+    pub object: Object,
+    /// Its triangles, in object space.
+    pub mesh: Arc<Mesh>,
+    /// Object to world.
+    pub model: DMat4,
+    /// The object's bounding sphere in world space.
+    pub sphere: Sphere,
+    /// Width and height of a picture in pixels.
+    pub resolution: [u32; 2],
+    /// The vertical field of view in degrees.
+    pub fov: f64,
+    /// What everything random comes from.
+    pub seed: u64,
+    /// The error that is allowed at the farthest distance, in display-referred values 0..1.
+    pub e_max: f64,
+    /// The exponent of the bound.
+    pub q: f64,
+    /// The distances that levels are made for, nearest first, from the eye to the sphere's centre.
+    pub distances: Vec<f64>,
+    /// The nearest distance, where autoLOD is 0.
+    pub nearest: f64,
+    /// The farthest distance, where the error may be `e_max`.
+    pub farthest: f64,
+    /// What the shader returns.
+    pub output: Output,
+    /// Unit vectors from the sphere's centre to the eye.
+    pub views: Vec<DVec3>,
+    /// Every scalar, vector and matrix in the shader's buffers that has a value, in the order of declaration.
+    pub uniforms: Vec<Uniform>,
+    /// The shader's textures.
+    pub textures: Vec<SceneTexture>,
+    /// The vertex stage that lodc supplies, when the file has none.
+    pub vertex_stage: Option<VertexStage>,
+    /// What was told from names and types.
+    pub inferences: Vec<Inference>,
+    /// What should be known besides.
+    pub warnings: Vec<Diagnostic>,
+    /// The files that were read, the shader first.
+    pub inputs: Vec<InputFile>,
+    attributes: BTreeMap<u32, Attribute>,
+    buffers: Vec<Buffer>,
+    /// The bindings that are the same in every picture.
+    constant: Bindings,
+    samples: usize,
+}
+
+/// A file that a result depends on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputFile {
+    /// As the user, or the scene file, names it.
+    pub name: String,
+    /// `blake3:` and 64 hexadecimal digits, over its bytes.
+    pub hash: String,
+}
+
+/// Which samples of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
+    /// A few, to search with: at most [`SEARCH_VIEWS`] views, each with one sample of the uniforms.
+    Search,
+    /// All of them: every view with every sample of the uniforms.
+    Full,
+}
+
+/// The most views that a search looks at.
+pub const SEARCH_VIEWS: usize = 3;
+
+/// Something that was left out of the scene, and told from a name and a type.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Inference {
+    /// What it is about: `camera.view_proj`.
+    pub what: String,
+    /// What it was taken for: `view-projection`.
+    pub as_: String,
+    /// The table of the scene file that could say so: `uniforms`.
+    pub table: &'static str,
+    /// The line in that table: `"camera.view_proj" = "view-projection"`.
+    pub line_to_add: String,
+}
+
+impl Inference {
+    /// `value` is as the scene file would write it.
+    fn new(table: &'static str, what: &str, value: &str) -> Self {
+        let bare = what
+            .bytes()
+            .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+        let quote = if bare && !what.is_empty() { "" } else { "\"" };
+        let plain = value.strip_prefix('"').and_then(|v| v.strip_suffix('"'));
+        Self {
+            what: what.to_owned(),
+            as_: plain.unwrap_or(value).to_owned(),
+            table,
+            line_to_add: format!("{quote}{what}{quote} = {value}"),
+        }
+    }
+}
+
+/// Something that was left out of the scene and that nothing tells.
+#[derive(Clone, Debug)]
+struct Missing {
+    table: &'static str,
+    line: String,
+    what: String,
+    type_name: String,
+    span: Span,
+}
+
+impl Scene {
+    /// Reads the scene of a shader: the file at `path`, or else the one beside the shader with its name
+    /// and the extension `toml`, or else nothing but inferences.
+    ///
+    /// # Errors
+    /// When the file cannot be read, and as [`Scene::resolve`].
+    pub fn read(source: &Source, path: Option<&Path>) -> Result<Self> {
+        let beside = || Some(source.path.as_ref()?.with_extension("toml")).filter(|p| p.exists());
+        match path.map(PathBuf::from).or_else(beside) {
+            Some(path) => {
+                let text = read_text(&path, "scene")?;
+                Self::resolve(source, Some((&path, &text)))
+            }
+            None => Self::resolve(source, None),
+        }
+    }
+
+    /// Fills a scene in against a shader. `file` is the scene file's path, which paths in it are relative to,
+    /// and its text.
+    ///
+    /// # Errors
+    /// When the text is no scene, does not fit the shader, or names images that cannot be read; and when
+    /// something is neither given nor to be inferred, naming all such things and the lines to add.
+    pub fn resolve(source: &Source, file: Option<(&Path, &str)>) -> Result<Self> {
+        let name = match file {
+            Some((path, _)) => path.display().to_string(),
+            None => {
+                let beside = Path::new(&source.name).with_extension("toml");
+                beside.display().to_string()
+            }
+        };
+        let text = file.map_or("", |(_, text)| text);
+        let toml = Toml { name: &name, text };
+        let file_values = toml.parse()?;
+        let settings = Settings::read(toml, &file_values)?;
+        let mut said = Said::default();
+        let mut buffers = buffers::resolve(
+            source,
+            toml,
+            &file_values.uniforms,
+            &file_values.storage,
+            &mut said,
+        )?;
+        let folder = match file {
+            Some((path, _)) => path.parent(),
+            None => source.path.as_deref().and_then(Path::parent),
+        };
+        let place = textures::Place {
+            folder: folder.unwrap_or(Path::new("")),
+            seed: settings.seed,
+        };
+        let images = textures::resolve(
+            source,
+            toml,
+            &file_values.textures,
+            &file_values.samplers,
+            place,
+        )?;
+        let mut inferences = said.inferences;
+        let fed = attributes::resolve(
+            source,
+            toml,
+            &file_values.attributes,
+            &settings,
+            &mut inferences,
+        )?;
+        if !said.missing.is_empty() {
+            let place = match file {
+                Some(_) => format!("`{name}`"),
+                None => format!("a scene file, `{name}`"),
+            };
+            return Err(buffers::missing_error(source, &place, &said.missing));
+        }
+        inferences.extend(images.inferences);
+        let uniforms = buffers.iter().flat_map(Buffer::uniforms).collect();
+        if let Some(stage) = &fed.stage {
+            buffers.extend(Buffer::of_semantics(&stage.module));
+        }
+        let mut inputs = vec![InputFile {
+            name: source.name.clone(),
+            hash: hash(source.text.as_bytes()),
+        }];
+        if file.is_some() {
+            inputs.push(InputFile {
+                name: name.clone(),
+                hash: hash(text.as_bytes()),
+            });
+        }
+        let files = images.inputs.into_iter();
+        inputs.extend(files.map(|(name, hash)| InputFile { name, hash }));
+        let mut scene = Self {
+            name: file.map(|_| name.clone()),
+            object: settings.object,
+            mesh: Arc::new(settings.mesh),
+            model: settings.model,
+            sphere: settings.sphere,
+            resolution: settings.resolution,
+            fov: settings.fov,
+            seed: settings.seed,
+            e_max: settings.e_max,
+            q: settings.q,
+            distances: settings.distances,
+            nearest: settings.nearest,
+            farthest: settings.farthest,
+            output: settings.output,
+            views: settings.views,
+            uniforms,
+            textures: images.textures,
+            vertex_stage: fed.stage,
+            inferences,
+            warnings: [settings.warnings, images.warnings].concat(),
+            inputs,
+            attributes: fed.attributes,
+            samples: buffers.iter().map(Buffer::samples).max().unwrap_or(1),
+            constant: Bindings::new(),
+            buffers,
+        };
+        let pose = scene.pose(DVec3::Z, scene.nearest);
+        for texture in &scene.textures {
+            let resource = Resource::Texture(texture.texture.clone());
+            scene
+                .constant
+                .insert((texture.group, texture.binding), resource);
+        }
+        for sampler in images.samplers {
+            let resource = Resource::Sampler(sampler.sampler);
+            scene
+                .constant
+                .insert((sampler.group, sampler.binding), resource);
+        }
+        for buffer in scene.buffers.iter().filter(|b| b.is_constant()) {
+            let resource = buffer.resource(&pose, &scene.sphere, 0);
+            scene.constant.insert(buffer.slot(), resource);
+        }
+        Ok(scene)
+    }
+
+    /// The pictures at a distance from the eye to the sphere's centre, in a fixed order: for each view, for each
+    /// sample of the uniforms. They are drawn at pixel centres, one sample a pixel; the caller may change
+    /// `offset` and `grid`.
+    pub fn frames(&self, distance: f64, set: Samples) -> Vec<Frame> {
+        let views = self.views.len();
+        let chosen: Vec<(usize, usize)> = match set {
+            Samples::Full => (0..views)
+                .flat_map(|view| (0..self.samples).map(move |sample| (view, sample)))
+                .collect(),
+            Samples::Search => {
+                let count = views.div_ceil(2).min(SEARCH_VIEWS);
+                let spaced = (0..count).map(|i| i * views / count);
+                spaced
+                    .enumerate()
+                    .map(|(i, view)| (view, i % self.samples))
+                    .collect()
+            }
+        };
+        chosen
+            .into_iter()
+            .map(|(view, sample)| self.frame(self.views[view], distance, sample))
+            .collect()
+    }
+
+    fn frame(&self, direction: DVec3, distance: f64, sample: usize) -> Frame {
+        let pose = self.pose(direction, distance);
+        let mut bindings = self.constant.clone();
+        for buffer in self.buffers.iter().filter(|b| !b.is_constant()) {
+            let resource = buffer.resource(&pose, &self.sphere, sample);
+            bindings.insert(buffer.slot(), resource);
+        }
+        Frame {
+            mesh: self.mesh.clone(),
+            attributes: self.attributes.clone(),
+            bindings,
+            width: self.resolution[0],
+            height: self.resolution[1],
+            offset: [0.0, 0.0],
+            grid: 1,
+        }
+    }
+
+    fn pose(&self, direction: DVec3, distance: f64) -> Pose {
+        Pose::new(
+            self.model,
+            self.sphere,
+            direction,
+            distance,
+            self.fov,
+            self.resolution,
+        )
+    }
+
+    /// How many samples of the uniforms there are: each sampled uniform takes its i-th value in the i-th,
+    /// and comes round.
+    pub fn uniform_samples(&self) -> usize {
+        self.samples
+    }
+
+    /// What autoLOD is computed from at a distance.
+    pub fn view(&self, distance: f64) -> autolod::View {
+        autolod::View {
+            s_max: autolod::s_max(&self.model.as_mat4()),
+            distance,
+            radius: self.sphere.radius,
+            // Not the camera's near plane, which moves with the object: the nearest that it can be.
+            z_near: camera::z_near(0.0, self.sphere.radius),
+            height: f64::from(self.resolution[1]),
+            fov: self.fov,
+        }
+    }
+
+    /// Pixels per object unit at the nearest distance: where autoLOD is 0.
+    pub fn rho0(&self) -> f64 {
+        autolod::rho(&self.view(self.nearest))
+    }
+
+    /// autoLOD at a distance.
+    pub fn auto_lod(&self, distance: f64) -> f64 {
+        autolod::auto_lod(self.rho0(), autolod::rho(&self.view(distance)))
+    }
+
+    /// The error that is allowed at a distance (see [`autolod::bound`]).
+    pub fn bound(&self, distance: f64) -> f64 {
+        autolod::bound(distance, self.nearest, self.farthest, self.e_max, self.q)
+    }
+}
+
+/// The hash of an input file.
+fn hash(bytes: &[u8]) -> String {
+    format!("blake3:{}", blake3::hash(bytes).to_hex())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "
+        struct Camera { view_proj: mat4x4f, eye: vec3f, time: f32 }
+        @group(0) @binding(0) var<uniform> camera: Camera;
+        @group(0) @binding(1) var<uniform> tint: vec4f;
+        @group(0) @binding(2) var picture: texture_2d<f32>;
+        @group(0) @binding(3) var picture_sampler: sampler;
+        struct V { @builtin(position) p: vec4f, @location(0) uv: vec2f }
+        @vertex fn vs(@location(0) position: vec3f, @location(1) uv: vec2f) -> V {
+            return V(camera.view_proj * vec4f(position, 1.0), uv);
+        }
+        @fragment fn fs(v: V) -> @location(0) vec4f {
+            return tint * textureSample(picture, picture_sampler, v.uv) + vec4f(camera.eye, camera.time);
+        }";
+
+    const TOML: &str = "
+        [uniforms]
+        tint = [1, 1, 1, 1]
+        [textures]
+        picture = \"dynamic\"
+        [views]
+        count = 4
+        ";
+
+    fn scene(shader: &str, toml: &str) -> Result<Scene> {
+        let source = Source::parse("a.wgsl", shader)?;
+        Scene::resolve(&source, Some((Path::new("a.toml"), toml)))
+    }
+
+    fn bytes(frame: &Frame, slot: (u32, u32)) -> &Arc<Vec<u8>> {
+        match &frame.bindings[&slot] {
+            Resource::Buffer(bytes) => bytes,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn there_is_a_frame_for_each_view_and_sample() {
+        let scene = scene(TEXT, TOML).unwrap();
+        // Time is sampled three times.
+        assert_eq!(scene.uniform_samples(), 3);
+        let full = scene.frames(5.0, Samples::Full);
+        assert_eq!(full.len(), 12);
+        let search = scene.frames(5.0, Samples::Search);
+        assert_eq!(search.len(), 2);
+        for frame in full.iter().chain(&search) {
+            assert_eq!(frame.bindings.len(), 4);
+            assert_eq!((frame.width, frame.height, frame.grid), (256, 256, 1));
+            assert_eq!(
+                frame.attributes,
+                BTreeMap::from([(0, Attribute::Position), (1, Attribute::Uv)])
+            );
+            // What does not change is shared.
+            assert!(Arc::ptr_eq(bytes(frame, (0, 1)), bytes(&full[0], (0, 1))));
+            assert!(Arc::ptr_eq(&frame.mesh, &full[0].mesh));
+        }
+        // Samples of a view differ in the time, views in the camera.
+        let (a, b, c) = (
+            bytes(&full[0], (0, 0)),
+            bytes(&full[1], (0, 0)),
+            bytes(&full[3], (0, 0)),
+        );
+        assert_eq!(a[..76], b[..76]);
+        assert_ne!(a[76..], b[76..]);
+        assert_ne!(a[..64], c[..64]);
+        // Each frame of the search is one of all.
+        assert!(
+            search
+                .iter()
+                .all(|s| full.iter().any(|f| bytes(f, (0, 0)) == bytes(s, (0, 0))))
+        );
+    }
+
+    #[test]
+    fn auto_lod_is_zero_at_the_nearest_distance_and_rises() {
+        let scene = scene(TEXT, TOML).unwrap();
+        assert_eq!(scene.auto_lod(scene.nearest), 0.0);
+        assert!((scene.auto_lod(3.0) - 1.0).abs() < 1e-6);
+        let lods: Vec<f64> = scene.distances.iter().map(|d| scene.auto_lod(*d)).collect();
+        assert!(lods.windows(2).all(|w| w[0] < w[1]), "{lods:?}");
+        assert_eq!(scene.bound(scene.nearest), 0.0);
+        assert_eq!(scene.bound(scene.farthest), 0.05);
+    }
+
+    #[test]
+    fn what_is_inferred_is_told_and_writing_it_down_changes_nothing() {
+        let told = scene(TEXT, TOML).unwrap();
+        let lines: Vec<&str> = told
+            .inferences
+            .iter()
+            .map(|i| i.line_to_add.as_str())
+            .collect();
+        assert_eq!(
+            lines,
+            [
+                "\"camera.view_proj\" = \"view-projection\"",
+                "\"camera.eye\" = \"camera-position\"",
+                "\"camera.time\" = \"time\"",
+                "position = \"position\"",
+                "uv = \"uv\"",
+            ]
+        );
+        let of = |table: &str| {
+            let lines = told.inferences.iter().filter(|i| i.table == table);
+            lines
+                .map(|i| i.line_to_add.clone())
+                .collect::<Vec<_>>()
+                .join("\n")
+        };
+        let toml = TOML.replace(
+            "[uniforms]",
+            &format!(
+                "[attributes]\n{}\n[uniforms]\n{}",
+                of("attributes"),
+                of("uniforms")
+            ),
+        );
+        let said = scene(TEXT, &toml).unwrap();
+        assert!(said.inferences.is_empty());
+        let (a, b) = (
+            told.frames(7.0, Samples::Full),
+            said.frames(7.0, Samples::Full),
+        );
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(bytes(a, (0, 0)), bytes(b, (0, 0)));
+            assert_eq!(a.attributes, b.attributes);
+        }
+    }
+
+    #[test]
+    fn a_supplied_stage_is_bound_apart_from_the_file() {
+        let shader = "@group(1) @binding(4) var<uniform> tint: vec4f;
+            @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f { return tint * vec4f(uv, uv); }";
+        let scene = scene(shader, "[uniforms]\ntint = [1, 1, 1, 1]").unwrap();
+        let frames = scene.frames(5.0, Samples::Full);
+        assert_eq!(frames.len(), 6);
+        assert_eq!(
+            frames[0].bindings.keys().collect::<Vec<_>>(),
+            [&(1, 4), &(1, 5)]
+        );
+        assert_eq!(bytes(&frames[0], (1, 5)).len(), 3 * 64 + 16);
+        assert_ne!(bytes(&frames[0], (1, 5)), bytes(&frames[1], (1, 5)));
+        // The stage is no part of the shader.
+        assert!(scene.uniforms.iter().all(|u| u.path == "tint"));
+    }
+
+    #[test]
+    fn what_nothing_tells_is_one_error_with_every_line() {
+        let shader = TEXT
+            .replace("tint: vec4f", "tint: vec4f, rough: f32")
+            .replace(
+                "var<uniform> tint: vec4f, rough: f32",
+                "var<uniform> tint: vec4f",
+            );
+        let source = Source::parse("a.wgsl", shader).unwrap();
+        let error = Scene::resolve(&source, None).unwrap_err();
+        assert_eq!(error.message, "what `tint` holds is not known");
+        let text = error.to_string();
+        assert!(text.contains("a.wgsl:4:"), "{text}");
+        assert!(
+            text.contains("put a value into a scene file, `a.toml`:"),
+            "{text}"
+        );
+        assert!(
+            text.contains("[uniforms]\n    \"tint\" = [0.0, 0.0, 0.0, 0.0]"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn every_input_is_hashed() {
+        let scene = scene(TEXT, TOML).unwrap();
+        let names: Vec<&str> = scene.inputs.iter().map(|i| i.name.as_str()).collect();
+        assert_eq!(names, ["a.wgsl", "a.toml"]);
+        assert_eq!(
+            scene.inputs[1].hash,
+            format!("blake3:{}", blake3::hash(TOML.as_bytes()).to_hex())
+        );
+    }
+
+    #[test]
+    fn the_material_scenes_of_the_repository_resolve() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let mut found = 0;
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|e| e != "wgsl") {
+                continue;
+            }
+            let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
+            let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+            assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+            assert!(scene.name.is_some());
+            found += 1;
+        }
+        assert!(found >= 6, "{found}");
+    }
+}

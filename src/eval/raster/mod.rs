@@ -39,10 +39,14 @@ pub enum Attribute {
     Uv,
     /// Tangent, with the sign of the bitangent in w.
     Tangent,
+    /// The bitangent: the normal times the tangent, with its sign.
+    Bitangent,
     /// The sign of the bitangent alone.
     BitangentSign,
     /// Colour.
     Colour,
+    /// The same words for every vertex, in the input's own kind.
+    Fixed([u32; 4]),
 }
 
 /// One picture to draw.

@@ -64,6 +64,10 @@ fn feed(words: &mut Words, slot: &Slot, first: usize, lanes: usize, mesh: &Mesh,
         Binding::BuiltIn(_) => return words[..lanes].fill(0),
         Binding::Location { location, .. } => frame.attributes.get(&location),
     };
+    if let Some(Attribute::Fixed(fixed)) = attribute {
+        let word = fixed.get(slot.component).copied().unwrap_or(0);
+        return words[..lanes].fill(word);
+    }
     for (lane, word) in words[..lanes].iter_mut().enumerate() {
         let value = attribute
             .and_then(|&attribute| component(mesh, attribute, first + lane, slot.component))
@@ -87,6 +91,13 @@ fn component(mesh: &Mesh, attribute: Attribute, vertex: usize, component: usize)
         Attribute::Normal => three(&mesh.normals),
         Attribute::Uv => mesh.uvs.get(vertex)?.get(component).copied(),
         Attribute::Tangent => mesh.tangents.get(vertex)?.get(component).copied(),
+        Attribute::Bitangent => {
+            let (n, t) = (mesh.normals.get(vertex)?, mesh.tangents.get(vertex)?);
+            let (a, b) = ((component + 1) % 3, (component + 2) % 3);
+            (component < 3).then(|| (n[a] * t[b] - n[b] * t[a]) * t[3])
+        }
+        // Its words are not the mesh's.
+        Attribute::Fixed(_) => None,
         Attribute::BitangentSign if component == 0 => mesh.tangents.get(vertex).map(|t| t[3]),
         Attribute::BitangentSign => None,
         Attribute::Colour => mesh.colours.get(vertex)?.get(component).copied(),
