@@ -148,6 +148,9 @@ fn find(
     })
 }
 
+/// One value of a place: its leaves in order, each with its numbers.
+type Whole = Vec<(Leaf, Vec<f64>)>;
+
 /// Reads values in the shape that a place has.
 struct Reader<'a> {
     layout: &'a Layout<'a>,
@@ -196,7 +199,7 @@ impl Reader<'_> {
                 .map(|(l, n)| (l, Fill::Dynamic(n)))
                 .collect());
         }
-        let samples: Vec<Vec<(Leaf, Vec<f64>)>> = match entries.get("samples") {
+        let samples: Vec<Whole> = match entries.get("samples") {
             Some(samples) => {
                 let list = match samples.get_ref() {
                     Node::List(list) => list,
@@ -239,7 +242,7 @@ impl Reader<'_> {
         place: &mut Place,
         value: &Spanned<Node>,
         entries: &Entries,
-    ) -> Result<Vec<Vec<(Leaf, Vec<f64>)>>> {
+    ) -> Result<Vec<Whole>> {
         let toml = self.toml;
         let (Some(from), Some(to)) = (entries.get("from"), entries.get("to")) else {
             let lacks = if entries.get("from").is_some() {
@@ -280,7 +283,7 @@ impl Reader<'_> {
     }
 
     /// One value for all of a place: its leaves, each with its numbers.
-    fn whole(&self, place: &mut Place, value: &Spanned<Node>) -> Result<Vec<(Leaf, Vec<f64>)>> {
+    fn whole(&self, place: &mut Place, value: &Spanned<Node>) -> Result<Whole> {
         let mut found = Vec::new();
         self.read(place, value, &mut found)?;
         if let (Some((_, _, None)), Node::List(list)) =
@@ -293,12 +296,7 @@ impl Reader<'_> {
         Ok(found)
     }
 
-    fn read(
-        &self,
-        place: &Place,
-        value: &Spanned<Node>,
-        found: &mut Vec<(Leaf, Vec<f64>)>,
-    ) -> Result<()> {
+    fn read(&self, place: &Place, value: &Spanned<Node>, found: &mut Whole) -> Result<()> {
         let wrong = |wants: String| {
             self.toml
                 .error(
