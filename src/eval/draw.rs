@@ -118,29 +118,46 @@ pub fn seen(coverage: &Coverage, shading: &Shading) -> Coverage {
 
 /// For each fine pixel the fragment that it shows: the nearest that is alive, of equal ones the first.
 fn nearest(coverage: &Coverage, shading: &Shading) -> Vec<Option<u32>> {
-    let count = coverage.width as usize * coverage.height as usize;
-    let mut nearest = vec![None; count];
-    let mut depths = vec![1.0_f32; if coverage.late { count } else { 0 }];
+    let mut nearest = vec![None; coverage.width as usize * coverage.height as usize];
+    let places = nearest.len();
+    let place = |_, pixel| pixel;
+    each_visible(coverage, shading, places, place, |pixel, fragment| {
+        nearest[pixel as usize] = Some(fragment as u32);
+    });
+    nearest
+}
+
+/// Shows every fragment that is alive and that none before it hides, with its place: the last one shown at a
+/// place is the one that is seen there. `place` numbers the pixels, below `places`, from a fragment and its fine
+/// pixel.
+pub(crate) fn each_visible(
+    coverage: &Coverage,
+    shading: &Shading,
+    places: usize,
+    place: impl Fn(usize, u32) -> u32,
+    mut show: impl FnMut(u32, usize),
+) {
+    let mut depths = vec![1.0_f32; if coverage.late { places } else { 0 }];
     for block in &coverage.blocks {
         for (i, lane) in block.covered.lanes().enumerate() {
             let fragment = block.first + i;
             if !shading.alive[fragment] {
                 continue;
             }
-            let pixel = block.pixels[lane] as usize;
+            let place = place(fragment, block.pixels[lane]);
             if coverage.late {
                 let own = shading.depths.get(fragment);
                 // Clamped to the viewport's range; NaN is 0.
                 let depth = own.copied().unwrap_or(block.depths[lane]).max(0.0);
-                if depth >= depths[pixel] {
+                let nearest = &mut depths[place as usize];
+                if depth >= *nearest {
                     continue;
                 }
-                depths[pixel] = depth;
+                *nearest = depth;
             }
-            nearest[pixel] = Some(fragment as u32);
+            show(place, fragment);
         }
     }
-    nearest
 }
 
 /// Draws a frame whole: rasterises, shades, resolves, and filters the grid's fine pixels into pixels.

@@ -10,6 +10,7 @@
 //! `less` against a buffer of f32 cleared to 1; nothing is culled; front faces are counter-clockwise on screen.
 //! Positions are snapped to 1/256 pixel for coverage (top-left rule) and exact for interpolation.
 
+mod part;
 mod quads;
 #[cfg(test)]
 mod tests;
