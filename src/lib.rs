@@ -3,13 +3,20 @@
 //! It reads a material shader and writes a drop-in replacement that contains cheaper versions of it,
 //! chosen by one `autoLOD` value, each with its measured error.
 
+pub mod compile;
 pub mod diagnostic;
 pub mod emit;
 pub mod front;
 
 pub use diagnostic::{Diagnostic, Result};
 
+#[cfg(feature = "cli")]
+pub mod cli;
 #[cfg(feature = "search")]
 pub mod eval;
 #[cfg(feature = "search")]
+pub mod report;
+#[cfg(feature = "search")]
 pub mod scene;
+#[cfg(feature = "search")]
+pub mod search;

@@ -1,3 +1,7 @@
 //! The command-line tool: a thin shell around the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lodc::cli::run(std::env::args_os())
+}

@@ -35,6 +35,7 @@ use std::path::{Path, PathBuf};
 /// How a level is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Form {
     /// By a pipeline constant. Asks nothing of the host; WGSL alone carries it.
     #[default]
@@ -48,6 +49,7 @@ pub enum Form {
 /// The language that is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Target {
     /// WGSL.
     #[default]

@@ -1,0 +1,174 @@
+//! The command line: arguments in, messages and an exit code out. All work is the library's.
+
+mod progress;
+
+use crate::compile::{self, Request};
+use crate::emit::{self, Form, Output, Target};
+use crate::front::Stages;
+use crate::{Diagnostic, Result, report};
+use clap::{Args, Parser, Subcommand};
+use progress::Bar;
+use std::ffi::OsString;
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Makes cheaper versions of a material shader for the distances at which nobody sees the difference
+#[derive(Debug, Parser)]
+#[command(
+    name = "lodc",
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    compile: CompileArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Lists every place that could be simplified, with its work and its candidates
+    Inspect(InputArgs),
+}
+
+/// What every command reads.
+#[derive(Debug, Args)]
+struct InputArgs {
+    /// The material shader, WGSL
+    #[arg(required = true)]
+    shader: Option<PathBuf>,
+    /// The scene that errors are measured over [default: the shader's name with .toml, if it is there]
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// The vertex entry point, where there are several
+    #[arg(long, value_name = "NAME")]
+    vertex: Option<String>,
+    /// The fragment entry point, where there are several
+    #[arg(long, value_name = "NAME")]
+    fragment: Option<String>,
+}
+
+#[derive(Debug, Args)]
+struct CompileArgs {
+    #[command(flatten)]
+    input: InputArgs,
+    /// The shader to write; lock and report go beside it [default: beside the source, with .lod.wgsl]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// How the host chooses a level
+    #[arg(long, value_enum, default_value_t = Form::Override)]
+    form: Form,
+    /// The language to write
+    #[arg(long, value_enum, default_value_t = Target::Wgsl)]
+    target: Target,
+    /// Writes the shader from the committed lock, without a search
+    #[arg(long)]
+    locked: bool,
+    /// Prints nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the tool. Exit code 0: done; 1: a check failed; 2: bad input or usage.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let done = match cli.command {
+        Some(Command::Inspect(input)) => inspect(input),
+        None => compile_command(cli.compile),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            print_diagnostic(&error);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn print_diagnostic(diagnostic: &Diagnostic) {
+    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    eprint!("{}", diagnostic.render(colour));
+}
+
+/// Prints to standard output; a reader that has gone away is no error.
+fn print(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+impl InputArgs {
+    fn request(self) -> Request {
+        Request {
+            // The parser has asked for it.
+            shader: self.shader.unwrap_or_default(),
+            scene: self.scene,
+            stages: Stages {
+                vertex: self.vertex,
+                fragment: self.fragment,
+            },
+            ..Request::default()
+        }
+    }
+}
+
+fn inspect(input: InputArgs) -> Result<()> {
+    print(&compile::inspect(&input.request())?);
+    Ok(())
+}
+
+fn compile_command(arguments: CompileArgs) -> Result<()> {
+    let mut request = arguments.input.request();
+    request.output = arguments.output;
+    request.emit = Output {
+        form: arguments.form,
+        target: arguments.target,
+    };
+    request.command = std::iter::once("lodc".to_owned())
+        .chain(std::env::args().skip(1))
+        .collect::<Vec<_>>()
+        .join(" ");
+    let quiet = arguments.quiet;
+    if arguments.locked {
+        let (files, warnings) = compile::locked(&request)?;
+        warnings
+            .iter()
+            .for_each(|warning| print_diagnostic(warning));
+        return write(&files, quiet);
+    }
+    let bar = Bar::new(quiet);
+    let compiled = compile::compile(&request, &|progress| bar.show(progress));
+    bar.finish();
+    let compiled = compiled?;
+    compiled
+        .warnings
+        .iter()
+        .for_each(|warning| print_diagnostic(warning));
+    if !quiet {
+        print(&report::summary(&compiled.report));
+    }
+    write(&compiled.files, quiet)?;
+    if !quiet {
+        print(&report::next(&compiled.report, request.emit.form));
+    }
+    Ok(())
+}
+
+fn write(files: &compile::Files, quiet: bool) -> Result<()> {
+    emit::write_atomically(files)?;
+    if !quiet {
+        let names: Vec<String> = files
+            .iter()
+            .map(|(file, _)| file.display().to_string())
+            .collect();
+        print(&format!("  wrote           {}\n", names.join("  ")));
+    }
+    Ok(())
+}

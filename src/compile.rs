@@ -1,0 +1,244 @@
+//! The main job: a material shader in; a shader with its levels, their lock and their report out.
+//!
+//! Nothing here touches the disk but to read; what is to be written comes back as names and contents, for
+//! [`crate::emit::write_atomically`].
+
+#[cfg(feature = "search")]
+mod search;
+
+#[cfg(feature = "search")]
+pub use search::{Compiled, compile, inspect};
+
+use crate::emit::{self, Lock, Output};
+use crate::front::{Source, Stages};
+use crate::{Diagnostic, Result};
+use lodc_passes::{Shader, normalize};
+use std::path::{Path, PathBuf};
+
+/// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
+/// The largest shader that was seen has 15,537.
+pub const EXPRESSION_LIMIT: usize = 100_000;
+
+/// What is compiled, and where it goes.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// The material shader.
+    pub shader: PathBuf,
+    /// The scene; by default the shader's name with `.toml`, when that is there.
+    pub scene: Option<PathBuf>,
+    /// The shader to write; by default `<stem>.lod.wgsl` beside the source.
+    pub output: Option<PathBuf>,
+    /// The entry points, where there are several.
+    pub stages: Stages,
+    /// The form and the language to write.
+    pub emit: Output,
+    /// The command that reproduces the result, for the report.
+    pub command: String,
+}
+
+/// Files to be written: names and contents.
+pub type Files = Vec<(PathBuf, Vec<u8>)>;
+
+impl Request {
+    /// The name that all outputs begin with, `folder/rock` for `folder/rock.lod.wgsl`.
+    fn base(&self) -> PathBuf {
+        match &self.output {
+            None => self.shader.with_extension(""),
+            Some(output) => {
+                let bare = output.with_extension("");
+                if bare.extension().is_some_and(|extension| extension == "lod") {
+                    bare.with_extension("")
+                } else {
+                    bare
+                }
+            }
+        }
+    }
+
+    /// The path of an output with this ending, such as `lod.toml`.
+    fn beside(&self, ending: &str) -> PathBuf {
+        let mut name = self.base().into_os_string();
+        name.push(".");
+        name.push(ending);
+        name.into()
+    }
+
+    /// The path of the lock.
+    pub fn lock(&self) -> PathBuf {
+        self.beside("lod.toml")
+    }
+
+    /// Puts emitted files in their place: their stem is the source's, and becomes that of the output. A single file
+    /// gets the very name that was asked for.
+    fn placed(&self, source: &Source, files: Files) -> Files {
+        let stem = Path::new(&source.name)
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let single = files.len() == 1;
+        files
+            .into_iter()
+            .map(|(name, contents)| {
+                let name = name.to_string_lossy();
+                let ending = name.strip_prefix(&stem).unwrap_or(&name);
+                let place = match &self.output {
+                    Some(output) if single => output.clone(),
+                    _ => self.beside(ending.trim_start_matches('.')),
+                };
+                (place, contents)
+            })
+            .collect()
+    }
+
+    /// Refuses to write over what was read.
+    fn spare(&self, files: &Files, inputs: &[PathBuf]) -> Result<()> {
+        for (file, _) in files {
+            let Ok(place) = file.canonicalize() else {
+                continue;
+            };
+            if let Some(input) = inputs
+                .iter()
+                .find(|input| input.canonicalize().ok().as_ref() == Some(&place))
+            {
+                return Err(Diagnostic::error(format!(
+                    "the output `{}` would overwrite the input `{}`",
+                    file.display(),
+                    input.display()
+                ))
+                .with_note("give another name with `-o`"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The source's normal form.
+///
+/// # Errors
+/// At its place, when inlining makes it larger than [`EXPRESSION_LIMIT`].
+pub fn normal_form(source: &Source) -> Result<Shader> {
+    normalize::normalize(
+        &source.module,
+        source.vertex.as_deref(),
+        &source.fragment,
+        EXPRESSION_LIMIT,
+    )
+    .map_err(|error| {
+        let located = Diagnostic::error(error.message).with_source(&source.name, &source.text);
+        match error.span.to_range() {
+            Some(range) => located.with_label(range, "here"),
+            None => located,
+        }
+    })
+}
+
+/// Emits from the lock, without a search: what `--locked` and a build script do. Warnings come beside the files: a
+/// scene that has changed since.
+///
+/// # Errors
+/// When the source or the lock cannot be read, or the lock is stale.
+pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
+    let path = request.lock();
+    let (lock, text) = Lock::read(&path)?;
+    let stages = Stages {
+        vertex: request
+            .stages
+            .vertex
+            .clone()
+            .or_else(|| lock.source.vertex.clone()),
+        fragment: request
+            .stages
+            .fragment
+            .clone()
+            .or_else(|| Some(lock.source.fragment.clone())),
+    };
+    let source = Source::read_stages(&request.shader, &stages)?;
+    let base = normal_form(&source)?;
+    let levels = lock.replay(&base, &path.display().to_string(), &text)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let changed = |file: &str, hash: &str| {
+        std::fs::read(folder.join(file)).map_or(true, |bytes| emit::hash(&bytes) != hash)
+    };
+    for texture in &lock.textures {
+        if changed(&texture.file, &texture.hash) {
+            return Err(Diagnostic::error(format!(
+                "the lock is stale: the texture `{}` has changed since its mean was taken, or is gone",
+                texture.file
+            ))
+            .with_note("renew it: run lodc without `--locked`, and commit what it writes"));
+        }
+    }
+    let mut warnings = Vec::new();
+    if let Some(scene) = &lock.scene
+        && changed(&scene.file, &scene.hash)
+    {
+        warnings.push(
+            Diagnostic::warning(format!(
+                "the scene `{}` has changed since the lock was made",
+                scene.file
+            ))
+            .with_note(
+                "the levels are those of the old scene; run lodc without `--locked` to renew them",
+            ),
+        );
+    }
+    let files = request.placed(&source, emit::emit(&source, &levels, request.emit)?);
+    request.spare(&files, std::slice::from_ref(&request.shader))?;
+    Ok((files, warnings))
+}
+
+/// The way from a folder to a file, with forward slashes; the file's own path when there is none.
+#[cfg(feature = "search")]
+fn relative(folder: &Path, file: &Path) -> String {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let (from, to) = (absolute(folder), absolute(file));
+    let shared = from
+        .components()
+        .zip(to.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let mut parts = vec!["..".to_owned(); from.components().count() - shared];
+    parts.extend(
+        to.components()
+            .skip(shared)
+            .map(|part| part.as_os_str().to_string_lossy().into_owned()),
+    );
+    parts.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(output: Option<&str>) -> Request {
+        Request {
+            shader: "shaders/rock.wgsl".into(),
+            output: output.map(PathBuf::from),
+            ..Request::default()
+        }
+    }
+
+    #[test]
+    fn outputs_share_the_name_that_was_asked_for() {
+        assert_eq!(request(None).lock(), Path::new("shaders/rock.lod.toml"));
+        assert_eq!(
+            request(Some("out/a.lod.wgsl")).lock(),
+            Path::new("out/a.lod.toml")
+        );
+        assert_eq!(
+            request(Some("out/a.wgsl")).lock(),
+            Path::new("out/a.lod.toml")
+        );
+    }
+
+    #[cfg(feature = "search")]
+    #[test]
+    fn relative_paths_climb_and_descend() {
+        assert_eq!(
+            relative(Path::new("a/b"), Path::new("a/c/d.png")),
+            "../c/d.png"
+        );
+        assert_eq!(relative(Path::new("a"), Path::new("a/d.png")), "d.png");
+        assert_eq!(relative(Path::new(""), Path::new("a/d.png")), "a/d.png");
+    }
+}

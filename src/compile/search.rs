@@ -1,0 +1,314 @@
+//! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
+
+use super::{Files, Request, normal_form, relative};
+use crate::emit::{self, EmitLevel, Lock, figure};
+use crate::eval::program::{Program, Refused};
+use crate::front::Source;
+use crate::report::{Input, Origin, Report};
+use crate::scene::{Scene, SceneTexture};
+use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
+use crate::{Diagnostic, Result};
+use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, cost};
+use naga::Expression;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// What compiling gives.
+#[derive(Debug)]
+pub struct Compiled {
+    /// The shader, the lock and the report, to be written.
+    pub files: Files,
+    /// The report.
+    pub report: Report,
+    /// What should be known, located.
+    pub warnings: Vec<Box<Diagnostic>>,
+}
+
+/// Everything that a search stands on.
+struct Ready {
+    source: Source,
+    scene: Scene,
+    /// The scene file, when there is one.
+    scene_file: Option<PathBuf>,
+    base: Shader,
+}
+
+impl Ready {
+    fn read(request: &Request) -> Result<Self> {
+        let source = Source::read_stages(&request.shader, &request.stages)?;
+        let beside = request.shader.with_extension("toml");
+        let scene_file = request
+            .scene
+            .clone()
+            .or_else(|| beside.is_file().then_some(beside));
+        let scene = Scene::read(&source, scene_file.as_deref())?;
+        let base = normal_form(&source)?;
+        Ok(Self {
+            source,
+            scene,
+            scene_file,
+            base,
+        })
+    }
+
+    /// The vertex program: of the source, or the one that lodc supplies.
+    fn vertex(&self) -> Result<Program> {
+        let compiled = match (&self.scene.vertex_stage, self.base.index(Stage::Vertex)) {
+            (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
+            (None, index) => Program::compile(self.base.module(), index.unwrap_or(0), &[]),
+        };
+        compiled.map_err(|refused| self.refused(&refused))
+    }
+
+    /// What the evaluator refuses, at its place.
+    fn refused(&self, refused: &Refused) -> Box<Diagnostic> {
+        let error = Diagnostic::error(format!("lodc cannot evaluate {}", refused.what))
+            .with_source(&self.source.name, &self.source.text)
+            .with_note(
+                "errors are measured by running the shader on the CPU, which does not do this",
+            );
+        match refused.span.to_range() {
+            Some(range) => error.with_label(range, "here"),
+            None => error,
+        }
+    }
+}
+
+/// Compiles a material shader: searches its levels, and makes the files that hold them.
+///
+/// # Errors
+/// When an input cannot be read or is wrong, at its place.
+pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Result<Compiled> {
+    let ready = Ready::read(request)?;
+    let vertex = ready.vertex()?;
+    let stand = Stand {
+        base: &ready.base,
+        vertex: &vertex,
+        scene: &ready.scene,
+    };
+    let found = search::find(&stand, progress).map_err(|refused| ready.refused(&refused))?;
+    let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
+    let levels: Vec<EmitLevel> = found
+        .levels
+        .iter()
+        .zip(&says)
+        .skip(1)
+        .map(emit_level)
+        .collect();
+
+    let mut files = request.placed(
+        &ready.source,
+        emit::emit(&ready.source, &levels, request.emit)?,
+    );
+    let lock = request.lock();
+    files.push((
+        lock.clone(),
+        ready.lock(request, &found, &levels).to_toml().into_bytes(),
+    ));
+    let report = Report::new(
+        &found,
+        &ready.base,
+        &ready.source.text,
+        &says,
+        ready.origin(request),
+    );
+    files.push((request.beside("lod.json"), report.json().into_bytes()));
+    let inputs: Vec<PathBuf> = ready.inputs(request).collect();
+    request.spare(&files, &inputs)?;
+    Ok(Compiled {
+        files,
+        report,
+        warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),
+    })
+}
+
+/// A level's figures as the lock and the shader's header hold them.
+fn emit_level((level, says): (&Level, &String)) -> EmitLevel {
+    EmitLevel {
+        autolod: level.autolod as f32,
+        shader: level.shader.clone(),
+        distance: figure(level.distance),
+        error: figure(level.error.rmse),
+        cost: figure(level.cost),
+        says: says.clone(),
+    }
+}
+
+impl Ready {
+    fn says(&self, level: &Level) -> String {
+        if level.recipe.0.is_empty() {
+            "the original".to_owned()
+        } else {
+            emit::says(&level.recipe, &self.source.fragment)
+        }
+    }
+
+    /// Every file that was read.
+    fn inputs<'a>(&'a self, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
+        let textures = self
+            .scene
+            .textures
+            .iter()
+            .flat_map(|texture| self.texture_files(texture));
+        [request.shader.clone()]
+            .into_iter()
+            .chain(self.scene_file.clone())
+            .chain(textures)
+    }
+
+    /// The files of a texture; the scene names them from its own folder.
+    fn texture_files<'a>(
+        &'a self,
+        texture: &'a SceneTexture,
+    ) -> impl Iterator<Item = PathBuf> + 'a {
+        let folder = self
+            .scene_file
+            .as_ref()
+            .and_then(|file| file.parent())
+            .unwrap_or(Path::new(""));
+        texture.files.iter().map(move |file| folder.join(file))
+    }
+
+    fn origin(&self, request: &Request) -> Origin {
+        let vertex = self.base.function(Stage::Vertex);
+        Origin {
+            command: request.command.clone(),
+            seed: self.scene.seed,
+            inputs: self
+                .scene
+                .inputs
+                .iter()
+                .map(|input| Input {
+                    file: input.name.clone(),
+                    hash: input.hash.clone(),
+                })
+                .collect(),
+            triangles: self.scene.mesh.indices.len() / 3,
+            vertex: vertex
+                .and_then(|function| cost::of_function(self.base.module(), function).ok())
+                .unwrap_or_default(),
+            warnings: self
+                .scene
+                .warnings
+                .iter()
+                .map(|w| w.message.clone())
+                .collect(),
+            inferences: self
+                .scene
+                .inferences
+                .iter()
+                .map(|inference| format!("{} = {}", inference.what, inference.as_))
+                .collect(),
+        }
+    }
+
+    fn lock(&self, request: &Request, found: &Found, levels: &[EmitLevel]) -> Lock {
+        let path = request.lock();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let averaged: BTreeSet<String> = found
+            .levels
+            .iter()
+            .flat_map(|level| averaged(&self.base, &level.recipe))
+            .collect();
+        Lock {
+            source: emit::LockedSource {
+                file: relative(folder, &request.shader),
+                normal_form: self.base.fingerprint().to_string(),
+                vertex: self.source.vertex.clone(),
+                fragment: self.source.fragment.clone(),
+            },
+            scene: self.scene_file.as_ref().map(|file| emit::LockedFile {
+                file: relative(folder, file),
+                hash: emit::hash(&std::fs::read(file).unwrap_or_default()),
+            }),
+            textures: self
+                .scene
+                .textures
+                .iter()
+                .filter(|texture| averaged.contains(&texture.name))
+                .flat_map(|texture| self.texture_files(texture).map(move |file| (texture, file)))
+                .map(|(texture, file)| emit::LockedTexture {
+                    name: texture.name.clone(),
+                    file: relative(folder, &file),
+                    hash: emit::hash(&std::fs::read(&file).unwrap_or_default()),
+                    texels_per_pixel: texels_per_pixel(&self.scene, texture, self.scene.nearest)
+                        .map(figure),
+                })
+                .collect(),
+            output: request.emit,
+            seed: self.scene.seed,
+            rho0: figure(found.rho0),
+            levels: found
+                .levels
+                .iter()
+                .skip(1)
+                .zip(levels)
+                .map(|(level, emitted)| emit::LockedLevel {
+                    autolod: emitted.autolod,
+                    distance: emitted.distance,
+                    error: emitted.error,
+                    floor: figure(level.error.floor),
+                    bound: figure(level.error.bound),
+                    cost: emitted.cost,
+                    says: emitted.says.clone(),
+                    recipe: level.recipe.clone(),
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The textures whose reads a recipe replaces by a mean.
+fn averaged<'a>(base: &'a Shader, recipe: &'a Recipe) -> impl Iterator<Item = String> + 'a {
+    recipe
+        .0
+        .iter()
+        .filter(|candidate| candidate.pass == "texture-removal")
+        .filter_map(|candidate| {
+            let (stage, mut value) = base.find(&candidate.site)?;
+            let function = base.function(stage)?;
+            loop {
+                value = match function.expressions[value] {
+                    Expression::GlobalVariable(global) => {
+                        return base.module().global_variables[global].name.clone();
+                    }
+                    Expression::ImageSample { image, .. } | Expression::ImageLoad { image, .. } => {
+                        image
+                    }
+                    Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => base,
+                    _ => return None,
+                };
+            }
+        })
+}
+
+/// Every candidate of a shader at the scene's middle distance, with what it is worth: for `lodc inspect`.
+///
+/// # Errors
+/// As [`compile`].
+pub fn inspect(request: &Request) -> Result<String> {
+    let ready = Ready::read(request)?;
+    let vertex = ready.vertex()?;
+    let stand = Stand {
+        base: &ready.base,
+        vertex: &vertex,
+        scene: &ready.scene,
+    };
+    let distances = &ready.scene.distances;
+    let distance = distances[distances.len() / 2];
+    let set = SampleSet::new(&stand, distance, Samples::Search)
+        .map_err(|refused| ready.refused(&refused))?;
+    let facts = set.facts(&ready.base);
+    let candidates: Vec<Candidate> = PASSES
+        .iter()
+        .flat_map(|pass| pass.candidates(&ready.base, &facts))
+        .collect();
+    let tried = search::try_each(&set, &ready.base, &candidates);
+    Ok(crate::report::inspection(
+        &ready.base,
+        &ready.source.text,
+        distance,
+        set.original(),
+        &tried,
+    ))
+}

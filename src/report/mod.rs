@@ -1,0 +1,302 @@
+//! The report: error against cost, level by level, as data and as a table.
+//!
+//! [`Report`] is the one source of both. What is not known is null, never left out, so that a program that
+//! reads it need not ask which version wrote it.
+
+mod terminal;
+
+pub use terminal::{inspection, next, summary, table};
+
+use crate::search::{AtDistance, Found, Level};
+use lodc_passes::{Class, PASSES, Shader, Work};
+use serde::Serialize;
+
+/// The report as data: `<stem>.lod.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// lodc's own version.
+    pub version: &'static str,
+    /// The command that reproduces it.
+    pub command: String,
+    /// The seed of everything that is sampled.
+    pub seed: u64,
+    /// What was read, each with the hash of its bytes.
+    pub inputs: Vec<Input>,
+    /// Pixels per object unit where autoLOD is 0.
+    pub rho0: f64,
+    /// How many variants were measured.
+    pub variants: u64,
+    /// Level 0, the original, first.
+    pub levels: Vec<LevelReport>,
+    /// Every variant that nothing beat in error and cost, distance by distance.
+    pub frontier: Vec<FrontierReport>,
+    /// What the scene does not need, and so was left out.
+    pub left_out: Vec<String>,
+    /// What should be known about this result.
+    pub warnings: Vec<String>,
+    /// What was inferred because the scene does not say it.
+    pub inferences: Vec<String>,
+}
+
+/// A file that decided the result.
+#[derive(Clone, Debug, Serialize)]
+pub struct Input {
+    /// Its path as given.
+    pub file: String,
+    /// `blake3:` and the hash of its bytes.
+    pub hash: String,
+}
+
+/// One level.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelReport {
+    /// Its threshold.
+    pub autolod: f64,
+    /// In world units.
+    pub distance: f64,
+    /// What changed, in words.
+    pub says: String,
+    /// In displayed colour, 0..1.
+    pub error: ErrorReport,
+    /// Measured or estimated run time.
+    pub time: TimeReport,
+    /// Executed work of a covered fragment.
+    pub cost: CostReport,
+    /// The mesh that goes with it.
+    pub mesh: MeshReport,
+    /// Its derivation.
+    pub recipe: Vec<StepReport>,
+    /// Numerical stability.
+    pub stability: StabilityReport,
+}
+
+/// The errors of a level.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorReport {
+    /// Root mean square difference from the reference.
+    pub rmse: f64,
+    /// That of the original.
+    pub floor: f64,
+    /// What the level adds.
+    pub excess: f64,
+    /// What it may add.
+    pub bound: f64,
+    /// The largest difference.
+    pub max: f64,
+    /// Peak signal-to-noise ratio, decibels; null when there is no difference.
+    pub psnr: Option<f64>,
+    /// FLIP; not measured yet.
+    pub flip: Option<f64>,
+    /// RMSE on samples that decided nothing; not measured yet.
+    pub held_out_rmse: Option<f64>,
+    /// Error of the transition into the level; not measured yet.
+    pub transition: Option<f64>,
+}
+
+/// The run time of a level.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimeReport {
+    /// `measured` or `estimated`.
+    pub kind: &'static str,
+    /// Milliseconds, when measured.
+    pub ms: Option<f64>,
+    /// As a share of the original's.
+    pub ratio: f64,
+    /// Lower end of the interval, when measured.
+    pub low: Option<f64>,
+    /// Upper end of the interval, when measured.
+    pub high: Option<f64>,
+    /// The adapter, when measured.
+    pub adapter: Option<String>,
+}
+
+/// The work of a level.
+#[derive(Clone, Debug, Serialize)]
+pub struct CostReport {
+    /// Arithmetic of a covered fragment, in full-rate scalar operations.
+    pub operations: f64,
+    /// Texture samples of a covered fragment.
+    pub texture_samples: f64,
+    /// Arithmetic of a vertex, static, in full-rate scalar operations.
+    pub vertex_operations: f64,
+    /// Parameters that the host must fill.
+    pub parameters: u32,
+    /// Bytes of generated textures.
+    pub texture_bytes: u64,
+}
+
+/// The mesh of a level.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeshReport {
+    /// The generated file; null for the scene's own mesh.
+    pub file: Option<String>,
+    /// How many triangles it has.
+    pub triangles: usize,
+}
+
+/// One step of a level's derivation.
+#[derive(Clone, Debug, Serialize)]
+pub struct StepReport {
+    /// The pass.
+    pub pass: String,
+    /// The value.
+    pub site: String,
+    /// What is done there.
+    pub choice: String,
+    /// Olano's class.
+    pub class: Option<Class>,
+    /// The line of the value in the source, from 1.
+    pub line: Option<u32>,
+    /// RMSE of the variant after this step.
+    pub error_after: Option<f64>,
+}
+
+/// Numerical stability of a level; not measured yet.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct StabilityReport {
+    /// In a word.
+    pub verdict: Option<String>,
+    /// The worst places.
+    pub worst: Vec<String>,
+}
+
+/// A non-dominated variant at a distance.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrontierReport {
+    /// In world units.
+    pub distance: f64,
+    /// RMSE on the search set.
+    pub rmse: f64,
+    /// Cost as a share of the original's.
+    pub cost: f64,
+    /// Its derivation, a step a string.
+    pub recipe: Vec<String>,
+}
+
+/// What a report says of where it comes from.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    /// The command that reproduces it.
+    pub command: String,
+    /// The seed.
+    pub seed: u64,
+    /// What was read.
+    pub inputs: Vec<Input>,
+    /// Triangles of the scene's mesh.
+    pub triangles: usize,
+    /// Static work of a vertex.
+    pub vertex: Work,
+    /// What should be known about this result.
+    pub warnings: Vec<String>,
+    /// What was inferred.
+    pub inferences: Vec<String>,
+}
+
+impl Report {
+    /// The report of a search. `says` words each level; `text` is the source that lines are counted in.
+    pub fn new(found: &Found, base: &Shader, text: &str, says: &[String], origin: Origin) -> Self {
+        let level = |(level, says): (&Level, &String)| {
+            level_report(level, says.clone(), base, text, &origin)
+        };
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            rho0: found.rho0,
+            variants: found.variants,
+            levels: found.levels.iter().zip(says).map(level).collect(),
+            frontier: found.distances.iter().flat_map(frontier).collect(),
+            left_out: Vec::new(),
+            command: origin.command,
+            seed: origin.seed,
+            inputs: origin.inputs,
+            warnings: origin.warnings,
+            inferences: origin.inferences,
+        }
+    }
+
+    /// As JSON, with a line end at the end.
+    pub fn json(&self) -> String {
+        // Serialising plain data to a string cannot fail: no map has keys that are not strings.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+fn level_report(
+    level: &Level,
+    says: String,
+    base: &Shader,
+    text: &str,
+    origin: &Origin,
+) -> LevelReport {
+    let error = &level.error;
+    let steps = level.recipe.0.iter().enumerate();
+    LevelReport {
+        autolod: level.autolod,
+        distance: level.distance,
+        says,
+        error: ErrorReport {
+            rmse: error.rmse,
+            floor: error.floor,
+            excess: error.excess(),
+            bound: error.bound,
+            max: error.max,
+            psnr: Some(error.psnr()).filter(|psnr| psnr.is_finite()),
+            flip: None,
+            held_out_rmse: None,
+            transition: None,
+        },
+        time: TimeReport {
+            kind: "estimated",
+            ms: None,
+            ratio: level.cost,
+            low: None,
+            high: None,
+            adapter: None,
+        },
+        cost: CostReport {
+            operations: level.work.operations(),
+            texture_samples: level.work.samples,
+            vertex_operations: origin.vertex.operations(),
+            parameters: 0,
+            texture_bytes: 0,
+        },
+        mesh: MeshReport {
+            file: None,
+            triangles: origin.triangles,
+        },
+        recipe: steps
+            .map(|(i, candidate)| StepReport {
+                pass: candidate.pass.clone(),
+                site: candidate.site.to_string(),
+                choice: candidate.choice.clone(),
+                class: PASSES
+                    .iter()
+                    .find(|pass| pass.name() == candidate.pass)
+                    .map(|pass| pass.class(candidate)),
+                line: base
+                    .find(&candidate.site)
+                    .and_then(|place| line_of(base, text, place)),
+                error_after: level.error_after.get(i).copied(),
+            })
+            .collect(),
+        stability: StabilityReport::default(),
+    }
+}
+
+fn frontier(at: &AtDistance) -> impl Iterator<Item = FrontierReport> + '_ {
+    at.frontier.iter().map(|seen| FrontierReport {
+        distance: at.distance,
+        rmse: seen.square.sqrt(),
+        cost: seen.work.total() / at.original.total(),
+        recipe: seen.recipe.0.iter().map(ToString::to_string).collect(),
+    })
+}
+
+/// The line of a value in the text that its module was parsed from, from 1; `None` when it has no place there.
+pub fn line_of(
+    shader: &Shader,
+    text: &str,
+    (stage, value): (lodc_passes::Stage, naga::Handle<naga::Expression>),
+) -> Option<u32> {
+    let span = shader.function(stage)?.expressions.get_span(value);
+    span.is_defined().then(|| span.location(text).line_number)
+}

@@ -1,0 +1,188 @@
+//! The report as a person sees it in a terminal: a table of levels, a table of sites.
+
+use super::{Report, line_of};
+use crate::emit::Form;
+use crate::search::Measured;
+use lodc_passes::{Candidate, Shader};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The table of levels.
+pub fn table(report: &Report) -> String {
+    let mut rows = vec![
+        [
+            "level",
+            "autoLOD",
+            "distance",
+            "error",
+            "floor",
+            "excess",
+            "bound",
+            "cost",
+            "samples",
+            "what changed",
+        ]
+        .map(str::to_owned),
+    ];
+    for (i, level) in report.levels.iter().enumerate() {
+        let original = i == 0;
+        let unless = |text: String| if original { "-".to_owned() } else { text };
+        rows.push([
+            i.to_string(),
+            format!("{:.2}", level.autolod),
+            format!("{:.2}", level.distance),
+            unless(format!("{:.3}", level.error.rmse)),
+            format!("{:.3}", level.error.floor),
+            unless(format!("{:.3}", level.error.excess)),
+            unless(format!("{:.3}", level.error.bound)),
+            format!("{:.2}", level.time.ratio),
+            samples(level.cost.texture_samples),
+            level.says.clone(),
+        ]);
+    }
+    columns(
+        &rows,
+        &[
+            true, false, false, false, false, false, false, false, false, true,
+        ],
+    )
+}
+
+/// Samples of a fragment on average: whole numbers without a point.
+fn samples(count: f64) -> String {
+    if count.fract() == 0.0 {
+        format!("{count:.0}")
+    } else {
+        format!("{count:.1}")
+    }
+}
+
+/// What a person sees when a search has ended: what was read, what was inferred, the levels.
+pub fn summary(report: &Report) -> String {
+    let mut out = String::new();
+    let mut line = |title: &str, text: &str| {
+        let _ = writeln!(out, "  {title:<16}{text}");
+    };
+    for (i, inference) in report.inferences.iter().enumerate() {
+        line(if i == 0 { "inferred" } else { "" }, inference);
+    }
+    line("searched", &format!("{} variants", report.variants));
+    out.push('\n');
+    out.push_str(&table(report));
+    out.push_str(
+        "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n\n",
+    );
+    out
+}
+
+/// What to do next, after the files have been written.
+pub fn next(report: &Report, form: Form) -> String {
+    let next = if report.levels.len() < 2 {
+        "nothing was worth a level: raise e_max or distance.farthest in the scene"
+    } else {
+        match form {
+            Form::Override => {
+                "set the pipeline constant autoLOD, or choose per draw with --form uniform"
+            }
+            Form::Uniform => "fill the uniform autoLOD for each draw",
+            Form::Files => "load the file of the level that autoLOD selects",
+        }
+    };
+    format!("  next            {next}\n")
+}
+
+/// The table of every value that could be simplified, in the order of the source's lines, with what
+/// the best single change there saves and adds at `distance`.
+pub fn inspection(
+    shader: &Shader,
+    text: &str,
+    distance: f64,
+    original: &Measured,
+    tried: &[(Candidate, Option<Measured>)],
+) -> String {
+    /// What is known of a site: how many candidates each pass has, and the best one.
+    #[derive(Default)]
+    struct Site<'a> {
+        passes: BTreeMap<&'a str, usize>,
+        /// Saved share of the cost, added error, and the change.
+        best: Option<(f64, f64, &'a Candidate)>,
+    }
+    let mut sites: BTreeMap<(u32, &str), Site<'_>> = BTreeMap::new();
+    for (candidate, measured) in tried {
+        let line = shader
+            .find(&candidate.site)
+            .and_then(|place| line_of(shader, text, place))
+            .unwrap_or(0);
+        let site = sites.entry((line, candidate.site.path())).or_default();
+        *site.passes.entry(&candidate.pass).or_default() += 1;
+        let Some(measured) = measured else { continue };
+        let saved = 1.0 - measured.work.total() / original.work.total();
+        let added = (measured.error.square() - original.error.square())
+            .max(0.0)
+            .sqrt();
+        // The most saved for the error: a change that adds none is the best there can be.
+        let worth = |saved: f64, added: f64| saved / added.max(1e-6);
+        if saved > 0.0
+            && site
+                .best
+                .is_none_or(|(s, a, _)| worth(saved, added) > worth(s, a))
+        {
+            site.best = Some((saved, added, candidate));
+        }
+    }
+    let mut rows =
+        vec![["line", "value", "candidates", "saves", "excess", "by"].map(str::to_owned)];
+    for ((line, value), site) in sites {
+        let passes: Vec<String> = site
+            .passes
+            .iter()
+            .map(|(pass, count)| {
+                if *count == 1 {
+                    (*pass).to_owned()
+                } else {
+                    format!("{pass} ({count})")
+                }
+            })
+            .collect();
+        let (saves, excess, by) = match site.best {
+            Some((saved, added, candidate)) => (
+                format!("{:.1} %", saved * 100.0),
+                format!("{added:.4}"),
+                candidate.choice.clone(),
+            ),
+            None => ("-".to_owned(), "-".to_owned(), String::new()),
+        };
+        let line = if line == 0 {
+            String::new()
+        } else {
+            line.to_string()
+        };
+        rows.push([line, value.to_owned(), passes.join(", "), saves, excess, by]);
+    }
+    let table = columns(&rows, &[false, true, true, false, false, true]);
+    format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n")
+}
+
+/// Rows as aligned columns, two spaces in front; `left` says which are aligned to the left.
+fn columns<const N: usize>(rows: &[[String; N]], left: &[bool; N]) -> String {
+    let mut widths = [0; N];
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let mut out = String::new();
+    for row in rows {
+        let mut line = String::from(" ");
+        for ((cell, width), left) in row.iter().zip(widths).zip(left) {
+            let _ = if *left {
+                write!(line, " {cell:<width$} ")
+            } else {
+                write!(line, " {cell:>width$} ")
+            };
+        }
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out
+}

@@ -1,0 +1,93 @@
+//! The Pareto frontier of error against cost over every variant that was seen.
+
+use lodc_passes::{Recipe, Work};
+
+/// A variant as the search saw it: its derivation, its error and its cost on the search set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// How it is made from the original.
+    pub recipe: Recipe,
+    /// `E^2` on the search set.
+    pub square: f64,
+    /// Executed work of a covered fragment.
+    pub work: Work,
+}
+
+/// The members that no other member beats in both error and cost, cheapest first.
+#[derive(Clone, Debug, Default)]
+pub struct Frontier {
+    members: Vec<Seen>,
+}
+
+impl Frontier {
+    /// Adds a variant, unless a member is at least as good in both, and drops those that it beats.
+    pub fn add(&mut self, seen: Seen) {
+        let cost = seen.work.total();
+        if !(seen.square.is_finite() && cost.is_finite()) {
+            return;
+        }
+        // Members are sorted by cost up, and so by error down.
+        let at = self
+            .members
+            .partition_point(|member| member.work.total() <= cost);
+        if at > 0 && self.members[at - 1].square <= seen.square {
+            return;
+        }
+        let same_cost = self.members[..at]
+            .iter()
+            .rposition(|member| member.work.total() < cost)
+            .map_or(0, |last| last + 1);
+        let beaten = self.members[at..]
+            .iter()
+            .take_while(|member| member.square >= seen.square)
+            .count();
+        self.members.splice(same_cost..at + beaten, [seen]);
+    }
+
+    /// The members, cheapest first.
+    pub fn members(&self) -> &[Seen] {
+        &self.members
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(cost: f64, square: f64) -> Seen {
+        Seen {
+            recipe: Recipe::default(),
+            square,
+            work: Work {
+                simple: cost,
+                ..Work::default()
+            },
+        }
+    }
+
+    #[test]
+    fn keeps_exactly_the_members_that_nothing_beats() {
+        let points = [
+            (5.0, 5.0),
+            (3.0, 6.0),
+            (3.0, 4.0),
+            (9.0, 1.0),
+            (9.0, 0.5),
+            (4.0, 4.0),
+            (1.0, 9.0),
+            (2.0, 9.0),
+            (6.0, f64::NAN),
+            (10.0, 0.0),
+        ];
+        let mut frontier = Frontier::default();
+        for (cost, square) in points {
+            frontier.add(seen(cost, square));
+        }
+        let found: Vec<_> = frontier
+            .members()
+            .iter()
+            .map(|m| (m.work.total(), m.square))
+            .collect();
+        assert_eq!(found, [(1.0, 9.0), (3.0, 4.0), (9.0, 0.5), (10.0, 0.0)]);
+    }
+}

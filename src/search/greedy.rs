@@ -1,0 +1,271 @@
+//! Greedy simplification at one distance: Olano's loop.
+//!
+//! The price of a candidate is the squared error that it adds for each unit of work that it saves.
+//! Every candidate is priced once; the cheapest is taken; then only the candidates at the front of the queue
+//! are priced again, until one that is up to date leads it. That is Olano's "re-compute costs for
+//! area local to site" without having to know how far an edit reaches.
+//!
+//! This work is based on: Olano, Kuehne, Simmons, "Automatic Shader Level of Detail", 2003,
+//! section 2; the lazy queue is that of Minoux, "Accelerated greedy algorithms", 1978.
+
+use super::frontier::{Frontier, Seen};
+use super::samples::{Measured, SampleSet};
+use crate::eval::program::Refused;
+use lodc_passes::{Candidate, Fingerprint, PASSES, Recipe, Shader, recipe};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How many stale candidates at the front of the queue are priced again at a time: enough to keep
+/// the cores busy, few enough that little is priced in vain.
+const BATCH: usize = 8;
+/// How often the front of the queue may be priced again before the best that is known is taken.
+const ROUNDS: usize = 6;
+
+/// A variant with what was measured of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Variant {
+    pub(crate) recipe: Recipe,
+    pub(crate) shader: Shader,
+    pub(crate) measured: Measured,
+}
+
+impl Variant {
+    /// Measures a shader that a recipe made.
+    pub(crate) fn new(
+        set: &SampleSet<'_>,
+        recipe: Recipe,
+        shader: Shader,
+    ) -> Result<Self, Refused> {
+        let measured = set.measure(&shader)?;
+        Ok(Self {
+            recipe,
+            shader,
+            measured,
+        })
+    }
+
+    pub(crate) fn seen(&self) -> Seen {
+        Seen {
+            recipe: self.recipe.clone(),
+            square: self.measured.error.square(),
+            work: self.measured.work,
+        }
+    }
+}
+
+/// What is known of a candidate's price: lower is better, and an edit that costs no error comes
+/// before any that does, the largest saving first.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+struct Price(f64, f64);
+
+impl Price {
+    fn of(before: &Measured, after: &Measured) -> Option<Self> {
+        let saved = before.work.total() - after.work.total();
+        let added = after.error.square() - before.error.square();
+        if saved <= 0.0 || saved.is_nan() || added.is_nan() {
+            return None;
+        }
+        Some(if added <= 0.0 {
+            Self(0.0, -saved)
+        } else {
+            Self(added / saved, -saved)
+        })
+    }
+}
+
+/// A candidate is known from step to step by what it does; the numbers that it bakes move a little.
+type Key = (String, String, String);
+
+fn key(candidate: &Candidate) -> Key {
+    (
+        candidate.pass.clone(),
+        candidate.site.path().to_owned(),
+        candidate.choice.clone(),
+    )
+}
+
+/// Prices that earlier steps, or the search at another distance, found. Only their order is used;
+/// `None` stands for a candidate that saved no work.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Prices(BTreeMap<Key, Option<Price>>);
+
+/// What one greedy descent is told.
+pub(crate) struct Descent<'a> {
+    /// The samples that it is judged on.
+    pub(crate) set: &'a SampleSet<'a>,
+    /// The largest `E^2` that a step may lead to.
+    pub(crate) limit: f64,
+    /// Told how many variants have been measured, and the cost of the current one as a share of the
+    /// original's.
+    pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
+}
+
+/// The candidates of one step, and what this step has found of them.
+struct Step<'a> {
+    current: &'a Variant,
+    candidates: Vec<Candidate>,
+    keys: Vec<Key>,
+    /// Measured in this step.
+    fresh: Vec<Option<Measured>>,
+    /// By identity, so that two candidates that do the same are measured once.
+    tried: BTreeMap<Fingerprint, Measured>,
+}
+
+impl Descent<'_> {
+    /// Simplifies `start` until nothing is left that saves work within the limit. Every variant that
+    /// was measured goes to the frontier. Returns how many that were.
+    pub(crate) fn run(&self, start: Variant, prices: &mut Prices, frontier: &mut Frontier) -> u64 {
+        let mut current = start;
+        let mut measured = 0;
+        // Errors seldom shrink as work goes: what was over the limit once is not tried again here.
+        let mut over = BTreeSet::new();
+        let mut swept = false;
+        frontier.add(current.seen());
+        loop {
+            let facts = self.set.facts(&current.shader);
+            let candidates: Vec<Candidate> = PASSES
+                .iter()
+                .flat_map(|pass| pass.candidates(&current.shader, &facts))
+                .collect();
+            let mut step = Step {
+                keys: candidates.iter().map(key).collect(),
+                fresh: vec![None; candidates.len()],
+                tried: BTreeMap::new(),
+                candidates,
+                current: &current,
+            };
+            let leader = self.lead(&mut step, prices, &mut over, frontier, &mut measured, swept);
+            let next = leader.and_then(|i| step.take(i));
+            match next {
+                Some(next) => {
+                    current = next;
+                    swept = false;
+                }
+                // What saved nothing may save something now that its other users are gone.
+                None if !swept => swept = true,
+                None => return measured,
+            }
+        }
+    }
+
+    /// The candidate with the best price that this step has confirmed.
+    fn lead(
+        &self,
+        step: &mut Step<'_>,
+        prices: &mut Prices,
+        over: &mut BTreeSet<Key>,
+        frontier: &mut Frontier,
+        measured: &mut u64,
+        sweep: bool,
+    ) -> Option<usize> {
+        let all = 0..step.candidates.len();
+        let mut batch: Vec<usize> = all
+            .clone()
+            .filter(|i| match prices.0.get(&step.keys[*i]) {
+                None => true,
+                Some(None) => sweep,
+                Some(Some(_)) => false,
+            })
+            .collect();
+        for round in 0.. {
+            step.measure(self, &batch, prices, over, frontier);
+            *measured += batch.len() as u64;
+            let share = step.current.measured.work.total() / self.set.original().work.total();
+            (self.progress)(*measured, share);
+            let mut queue: Vec<(Price, usize)> = all
+                .clone()
+                .filter(|i| !over.contains(&step.keys[*i]))
+                .filter_map(|i| Some((prices.0.get(&step.keys[i]).copied()??, i)))
+                .collect();
+            queue.sort_by(|a, b| {
+                a.0.0
+                    .total_cmp(&b.0.0)
+                    .then(a.0.1.total_cmp(&b.0.1))
+                    .then(a.1.cmp(&b.1))
+            });
+            let leader = queue.iter().position(|(_, i)| step.fresh[*i].is_some());
+            if leader == Some(0) || queue.is_empty() || (round >= ROUNDS && leader.is_some()) {
+                return leader.map(|at| queue[at].1);
+            }
+            batch = queue
+                .iter()
+                .map(|(_, i)| *i)
+                .filter(|i| step.fresh[*i].is_none())
+                .take(BATCH)
+                .collect();
+        }
+        None
+    }
+}
+
+impl Step<'_> {
+    /// Measures candidates in parallel and notes their prices.
+    fn measure(
+        &mut self,
+        descent: &Descent<'_>,
+        batch: &[usize],
+        prices: &mut Prices,
+        over: &mut BTreeSet<Key>,
+        frontier: &mut Frontier,
+    ) {
+        let results: Vec<Option<(Fingerprint, Measured)>> = batch
+            .par_iter()
+            .map(|i| {
+                let shader = recipe::apply(&self.current.shader, &self.candidates[*i]).ok()?;
+                let fingerprint = shader.fingerprint();
+                let measured = match self.tried.get(&fingerprint) {
+                    Some(measured) => *measured,
+                    None => descent.set.measure(&shader).ok()?,
+                };
+                Some((fingerprint, measured))
+            })
+            .collect();
+        for (i, result) in batch.iter().copied().zip(results) {
+            let mut price = None;
+            if let Some((fingerprint, measured)) = result {
+                price = Price::of(&self.current.measured, &measured);
+                self.tried.insert(fingerprint, measured);
+                self.fresh[i] = Some(measured);
+                let mut recipe = self.current.recipe.clone();
+                recipe.0.push(self.candidates[i].clone());
+                frontier.add(Seen {
+                    recipe,
+                    square: measured.error.square(),
+                    work: measured.work,
+                });
+                if measured.error.square() > descent.limit {
+                    over.insert(self.keys[i].clone());
+                }
+            }
+            prices.0.insert(self.keys[i].clone(), price);
+        }
+    }
+
+    /// The variant that a measured candidate makes.
+    fn take(&self, i: usize) -> Option<Variant> {
+        let mut recipe = self.current.recipe.clone();
+        recipe.0.push(self.candidates[i].clone());
+        Some(Variant {
+            recipe,
+            shader: recipe::apply(&self.current.shader, &self.candidates[i]).ok()?,
+            measured: self.fresh[i]?,
+        })
+    }
+}
+
+/// Each candidate applied alone to a shader, in parallel; `None` where it does not apply.
+pub fn try_each(
+    set: &SampleSet<'_>,
+    shader: &Shader,
+    candidates: &[Candidate],
+) -> Vec<(Candidate, Option<Measured>)> {
+    candidates
+        .par_iter()
+        .map(|candidate| {
+            let measured = recipe::apply(shader, candidate)
+                .ok()
+                .and_then(|shader| set.measure(&shader).ok());
+            (candidate.clone(), measured)
+        })
+        .collect()
+}

@@ -1,0 +1,250 @@
+//! From distances to levels: the cheapest variant at each distance whose error stays within the bound there.
+//!
+//! Distances are spaced evenly in the logarithm from the nearest to the farthest of the scene. The bound
+//! at a distance is Liang's `e_a(d)` (2022, eq. 4). A descent works on a search set of samples; what it
+//! finds becomes a level only when the full set confirms it, at the start, in the middle and at the end of the
+//! interval in which the level is used.
+
+use super::error::ErrorFigures;
+use super::frontier::{Frontier, Seen};
+use super::greedy::{Descent, Prices, Variant};
+use super::samples::{Measured, SampleSet, Samples, Stand};
+use crate::eval::program::Refused;
+use crate::scene::Scene;
+use lodc_passes::{Recipe, Shader, Work};
+
+/// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
+const MERGE_BELOW: f64 = 0.04;
+
+/// A level: a variant and the distance from which it is used.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// The threshold: halvings of scale on screen since the nearest view.
+    pub autolod: f64,
+    /// From the eye to the centre of the bounding sphere, in world units.
+    pub distance: f64,
+    /// How it is made from the original; empty for the original.
+    pub recipe: Recipe,
+    /// The shader that the recipe makes.
+    pub shader: Shader,
+    /// Its error at `distance`, over the full set of samples.
+    pub error: ErrorFigures,
+    /// Executed work of a covered fragment at `distance`.
+    pub work: Work,
+    /// The work as a share of the original's at the same distance: an estimate of the run time.
+    pub cost: f64,
+    /// For each step of the recipe, the RMSE after it, over the full set.
+    pub error_after: Vec<f64>,
+}
+
+/// What was seen at one distance.
+#[derive(Clone, Debug)]
+pub struct AtDistance {
+    /// In world units.
+    pub distance: f64,
+    /// Its autoLOD value.
+    pub autolod: f64,
+    /// The original's own work there.
+    pub original: Work,
+    /// The original's `E^2` on the search set.
+    pub floor_square: f64,
+    /// Cheapest first.
+    pub frontier: Vec<Seen>,
+}
+
+/// Everything that a search found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Level 0, the original, and those that are worth having, nearest first.
+    pub levels: Vec<Level>,
+    /// What was seen at each distance.
+    pub distances: Vec<AtDistance>,
+    /// How many variants were measured.
+    pub variants: u64,
+    /// Pixels per object unit at the nearest distance, where autoLOD is 0.
+    pub rho0: f64,
+}
+
+/// How far a search has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// The distance that is worked on, from 1.
+    pub distance: usize,
+    /// How many distances there are.
+    pub of: usize,
+    /// Variants measured so far.
+    pub variants: u64,
+    /// The cost of the current variant as a share of the original's.
+    pub share: f64,
+}
+
+/// Searches the levels of a shader in a scene: greedy at each distance, every variant that was seen on
+/// the frontier, frontier members confirmed on the full set.
+///
+/// # Errors
+/// When the evaluator refuses the original, at the expression.
+pub fn find(
+    stand: &Stand<'_>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> std::result::Result<Found, Refused> {
+    let scene = stand.scene;
+    let distances = &scene.distances;
+    let original = |distance: f64, set: &SampleSet<'_>| Level {
+        autolod: scene.auto_lod(distance),
+        distance,
+        recipe: Recipe::default(),
+        shader: stand.base.clone(),
+        error: ErrorFigures::new(
+            &set.original().error,
+            &set.original().error,
+            scene.bound(distance),
+        ),
+        work: set.original().work,
+        cost: 1.0,
+        error_after: Vec::new(),
+    };
+    let nearest = SampleSet::new(stand, distances[0], Samples::Full)?;
+    let mut levels = vec![original(distances[0], &nearest)];
+    let mut seen = Vec::new();
+    let mut prices = Prices::default();
+    let mut variants = 0;
+    for (at, distance) in distances.iter().copied().enumerate().skip(1) {
+        let search = SampleSet::new(stand, distance, Samples::Search)?;
+        let bound = scene.bound(distance);
+        let limit = search.original().error.square() + bound * bound;
+        let descent = Descent {
+            set: &search,
+            limit,
+            progress: &|measured, share| {
+                progress(Progress {
+                    distance: at,
+                    of: distances.len() - 1,
+                    variants: variants + measured,
+                    share,
+                });
+            },
+        };
+        let base = Variant::new(&search, Recipe::default(), stand.base.clone())?;
+        let before = &levels[levels.len() - 1];
+        let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())
+            .ok()
+            .filter(|variant| variant.measured.error.square() <= limit)
+            .unwrap_or_else(|| base.clone());
+        let mut frontier = Frontier::default();
+        frontier.add(base.seen());
+        variants += descent.run(start, &mut prices, &mut frontier);
+        let feasible: Vec<&Seen> = frontier
+            .members()
+            .iter()
+            .filter(|member| member.square <= limit)
+            .collect();
+        let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
+        let checks = [distance, (distance * next).sqrt(), next]
+            .map(|distance| Check::new(stand, distance))
+            .into_iter()
+            .collect::<std::result::Result<Vec<_>, _>>()?;
+        if let Some(level) = cheapest_confirmed(stand, &feasible, &checks) {
+            let before = &levels[levels.len() - 1];
+            if level.cost < (1.0 - MERGE_BELOW) * before.cost {
+                levels.push(level);
+            }
+        }
+        seen.push(AtDistance {
+            distance,
+            autolod: scene.auto_lod(distance),
+            original: search.original().work,
+            floor_square: search.original().error.square(),
+            frontier: frontier.members().to_vec(),
+        });
+    }
+    Ok(Found {
+        levels,
+        distances: seen,
+        variants,
+        rho0: scene.rho0(),
+    })
+}
+
+/// The autoLOD of a distance as a threshold: rounded up to hundredths, so that it reads well and no level
+/// begins nearer than where it was confirmed.
+fn threshold(scene: &Scene, distance: f64) -> f64 {
+    (scene.auto_lod(distance) * 100.0).ceil() / 100.0
+}
+
+/// The full set of samples at one distance of a level's interval, and the bound there.
+struct Check<'a> {
+    set: SampleSet<'a>,
+    bound: f64,
+}
+
+impl<'a> Check<'a> {
+    fn new(stand: &'a Stand<'a>, distance: f64) -> std::result::Result<Self, Refused> {
+        Ok(Self {
+            set: SampleSet::new(stand, distance, Samples::Full)?,
+            bound: stand.scene.bound(distance),
+        })
+    }
+
+    fn passes(&self, measured: &Measured) -> bool {
+        measured.error.square() <= self.set.original().error.square() + self.bound * self.bound
+    }
+}
+
+/// The cheapest member that every check passes. Error falls as cost rises along a frontier, so the place is
+/// found by bisection, and then confirmed upwards.
+fn cheapest_confirmed(stand: &Stand<'_>, members: &[&Seen], checks: &[Check<'_>]) -> Option<Level> {
+    let judge = |member: &Seen| -> Option<Level> {
+        let shader = member.recipe.replay(stand.base).ok()?;
+        shader.validate().ok()?;
+        let mut first = None;
+        for check in checks {
+            let measured = check.set.measure(&shader).ok()?;
+            if !check.passes(&measured) {
+                return None;
+            }
+            first.get_or_insert(measured);
+        }
+        let (start, measured) = (&checks[0], first?);
+        let distance = start.set.distance();
+        Some(Level {
+            autolod: threshold(stand.scene, distance),
+            distance,
+            recipe: member.recipe.clone(),
+            error: ErrorFigures::new(&measured.error, &start.set.original().error, start.bound),
+            work: measured.work,
+            cost: measured.work.total() / start.set.original().work.total(),
+            error_after: error_after(stand, &member.recipe, &start.set),
+            shader,
+        })
+    };
+    let (mut low, mut high) = (0, members.len());
+    let mut best = None;
+    while low < high {
+        let middle = low + (high - low) / 2;
+        match judge(members[middle]) {
+            Some(level) => {
+                best = Some(level);
+                high = middle;
+            }
+            None => low = middle + 1,
+        }
+    }
+    best
+}
+
+/// The RMSE after each step of a recipe.
+fn error_after(stand: &Stand<'_>, recipe: &Recipe, set: &SampleSet<'_>) -> Vec<f64> {
+    let mut shader = stand.base.clone();
+    let mut errors = Vec::new();
+    for candidate in &recipe.0 {
+        let Ok(next) = lodc_passes::recipe::apply(&shader, candidate) else {
+            break;
+        };
+        shader = next;
+        match set.measure(&shader) {
+            Ok(measured) => errors.push(measured.error.square().sqrt()),
+            Err(_) => break,
+        }
+    }
+    errors
+}

@@ -1,0 +1,23 @@
+//! The search: which recipe is worth having at which distance.
+//!
+//! ```text
+//! Scene x original --samples--> SampleSet      what errors are measured over, at one distance
+//! SampleSet x Shader --error--> E^2, work      one variant
+//! base x SampleSet --greedy--> variants --frontier--> non-dominated ones
+//! frontiers x distances --levels--> levels     confirmed on the full set
+//! ```
+//!
+//! It knows nothing of the command line or of reports.
+
+pub mod error;
+pub mod frontier;
+mod greedy;
+pub mod levels;
+pub mod samples;
+
+pub use error::{ErrorFigures, ErrorSum};
+pub use frontier::{Frontier, Seen};
+pub use greedy::try_each;
+pub use levels::{AtDistance, Found, Level, Progress, find};
+pub(crate) use samples::texels_per_pixel;
+pub use samples::{Measured, SampleSet, Samples, Stand};
