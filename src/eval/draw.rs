@@ -293,21 +293,7 @@ impl Job<'_> {
 
 /// The profile of two runs of one program, the first one first.
 fn merge(mut first: Profile, second: Profile) -> Profile {
-    first.lanes += second.lanes;
-    first.work += second.work;
-    for (ours, theirs) in first.probes.iter_mut().zip(&second.probes) {
-        for (ours, theirs) in ours.iter_mut().zip(theirs) {
-            ours.count += theirs.count;
-            ours.sum += theirs.sum;
-            // NaN wins, unlike in `f32::min`.
-            if theirs.min < ours.min || theirs.min.is_nan() {
-                ours.min = theirs.min;
-            }
-            if theirs.max > ours.max || theirs.max.is_nan() {
-                ours.max = theirs.max;
-            }
-        }
-    }
+    first.absorb(&second);
     first
 }
 

@@ -1,0 +1,167 @@
+//! Compiles an entry point of a naga module to a register program.
+//!
+//! ```text
+//! Module --lower--> Ir       scalars, calls inlined, stores forwarded
+//! Ir --simplify--> Ir        what nothing reads is gone
+//! Ir --uniform--> Uniformity what is the same for all lanes
+//! Ir --registers--> Code     what a Machine runs
+//! ```
+
+pub(super) mod code;
+mod expression;
+mod ir;
+mod lower;
+mod registers;
+mod simplify;
+mod uniform;
+
+use lodc_passes::Work;
+use naga::{
+    Binding, Expression, FunctionArgument, FunctionResult, Handle, Interpolation, Module,
+    ScalarKind, Span, TypeInner,
+};
+
+/// A compiled entry point.
+#[derive(Debug)]
+pub struct Program {
+    pub(super) code: code::Code,
+    inputs: Vec<Slot>,
+    outputs: Vec<Slot>,
+    discards: bool,
+    /// What a lane that is counted has worked, by count.
+    pub(super) work: Vec<Work>,
+    pub(super) buffers: Vec<(u32, u32)>,
+    pub(super) textures: Vec<(u32, u32)>,
+    pub(super) samplers: Vec<(u32, u32)>,
+    /// The components of each probe.
+    pub(super) probes: Vec<usize>,
+}
+
+/// One scalar component of an entry point's input or output.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slot {
+    /// The location or built-in that it belongs to.
+    pub binding: Binding,
+    /// The component, 0..4.
+    pub component: usize,
+    /// What its word holds.
+    pub kind: ScalarKind,
+    /// How it is interpolated; `None` for built-ins and for integers' `Flat`-less vertex inputs.
+    pub interpolation: Option<Interpolation>,
+}
+
+/// Something the evaluator does not run (storage writes, ray queries, subgroup operations, ...).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refused {
+    /// What it is, lower case.
+    pub what: String,
+    /// Where, in the text that the module was parsed from.
+    pub span: Span,
+}
+
+impl Program {
+    /// Compiles the entry point at `entry` of a validated module. `probes` are expressions of its
+    /// function whose values are summed up while it runs (see [`super::machine::Profile`]); one that
+    /// does not hold floats has no components there.
+    ///
+    /// # Errors
+    /// At the first expression or statement that the evaluator does not run.
+    ///
+    /// # Panics
+    /// When there is no such entry point.
+    pub fn compile(
+        module: &Module,
+        entry: usize,
+        probes: &[Handle<Expression>],
+    ) -> Result<Self, Refused> {
+        let function = &module.entry_points[entry].function;
+        let mut ir = lower::Lowering::run(module, &module.entry_points[entry], probes)?;
+        simplify::simplify(&mut ir);
+        let homes = uniform::Homes::of(&ir);
+        let uniformity = uniform::analyse(&ir, &homes);
+        Ok(Self {
+            code: registers::write(&ir, &homes, &uniformity),
+            inputs: inputs(module, &function.arguments),
+            outputs: outputs(module, function.result.as_ref()),
+            discards: ir.discards,
+            work: ir.work,
+            buffers: ir.buffers,
+            textures: ir.textures,
+            samplers: ir.samplers,
+            probes: ir.probes,
+        })
+    }
+
+    /// The scalars that each lane is given, in the order of the entry point's arguments, flattened.
+    pub fn inputs(&self) -> &[Slot] {
+        &self.inputs
+    }
+
+    /// The scalars that each lane returns, in the order of the result, flattened.
+    pub fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    /// Whether a lane may be discarded.
+    pub fn discards(&self) -> bool {
+        self.discards
+    }
+}
+
+fn inputs(module: &Module, arguments: &[FunctionArgument]) -> Vec<Slot> {
+    let mut slots = Vec::new();
+    for argument in arguments {
+        let inner = &module.types[argument.ty].inner;
+        slots_of(module, inner, argument.binding.as_ref(), &mut slots);
+    }
+    slots
+}
+
+fn outputs(module: &Module, result: Option<&FunctionResult>) -> Vec<Slot> {
+    let mut slots = Vec::new();
+    if let Some(result) = result {
+        let inner = &module.types[result.ty].inner;
+        slots_of(module, inner, result.binding.as_ref(), &mut slots);
+    }
+    slots
+}
+
+fn slots_of(module: &Module, inner: &TypeInner, binding: Option<&Binding>, slots: &mut Vec<Slot>) {
+    match (inner, binding) {
+        (TypeInner::Struct { members, .. }, None) => {
+            for member in members {
+                let inner = &module.types[member.ty].inner;
+                slots_of(module, inner, member.binding.as_ref(), slots);
+            }
+        }
+        (_, Some(binding)) => {
+            let first = slots.len();
+            leaves(module, inner, &mut |kind| {
+                slots.push(Slot {
+                    binding: binding.clone(),
+                    component: slots.len() - first,
+                    kind,
+                    interpolation: match binding {
+                        Binding::Location { interpolation, .. } => *interpolation,
+                        Binding::BuiltIn(_) => None,
+                    },
+                });
+            });
+        }
+        (_, None) => {}
+    }
+}
+
+/// Calls `visit` with the kind of each scalar.
+fn leaves(module: &Module, inner: &TypeInner, visit: &mut impl FnMut(ScalarKind)) {
+    match inner {
+        TypeInner::Scalar(scalar) => visit(scalar.kind),
+        TypeInner::Vector { size, scalar } => (0..*size as u32).for_each(|_| visit(scalar.kind)),
+        TypeInner::Array {
+            base,
+            size: naga::ArraySize::Constant(size),
+            ..
+        } => (0..size.get()).for_each(|_| leaves(module, &module.types[*base].inner, visit)),
+        _ => {}
+    }
+}
