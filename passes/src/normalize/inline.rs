@@ -3,7 +3,7 @@
 //! What a callee computes keeps its names and its spans, and remembers the path of calls that led to
 //! it. Private variables become local variables of the entry point.
 
-use super::names::Tag;
+use super::names::{Tag, is_place};
 use super::{NormalizeError, returns};
 use crate::operands;
 use naga::{
@@ -359,7 +359,8 @@ impl Inliner<'_> {
     /// Names a value after what a person called it, unless it has a name.
     fn name(&mut self, value: Handle<Expression>, name: &str, path: &Arc<str>) {
         let tag = &mut self.out.tags[value.index()];
-        let computed = !self.out.function.expressions[value].needs_pre_emit();
+        let expressions = &self.out.function.expressions;
+        let computed = !expressions[value].needs_pre_emit() && !is_place(expressions, value);
         if computed && tag.name.is_none() {
             *tag = Tag::named(path.clone(), Some(name));
             let names = &mut self.out.function.named_expressions;

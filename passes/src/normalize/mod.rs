@@ -189,7 +189,7 @@ impl Tagged {
         // What a person called a variable, the values that it holds are called.
         for (value, local) in rebuilt.stored {
             let tag = &mut tags[value.index()];
-            if tag.name.is_none() {
+            if tag.name.is_none() && !names::is_place(&self.function.expressions, value) {
                 *tag = self.locals[local.index()].clone();
             }
         }

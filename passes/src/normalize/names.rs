@@ -7,11 +7,11 @@
 //! matter.
 
 use crate::fingerprint::Declared;
-use crate::operands;
+use crate::operands::{self, User};
 use crate::shader::ValueId;
 use naga::{
-    AddressSpace, Block, EntryPoint, Expression, Function, Handle, Literal, Module, Statement,
-    SwizzleComponent, Type, TypeInner,
+    AddressSpace, Arena, Block, EntryPoint, Expression, Function, Handle, Literal, Module,
+    Statement, SwizzleComponent, Type, TypeInner,
 };
 use std::collections::HashMap;
 use std::hash::{Hash, Hasher};
@@ -49,10 +49,14 @@ pub(super) fn ids(module: &mut Module, tags: &[Vec<Tag>]) -> Vec<Vec<ValueId>> {
         let ids = Naming::new(module, &module.entry_points[entry], tags).ids(&declared);
         all.push(ids);
         let function = &mut module.entry_points[entry].function;
+        let users = operands::users(function);
+        let stored = stored_alone(function, &users);
         let mut names = naga::FastIndexMap::default();
         for (value, expression) in function.expressions.iter() {
             if let Some(name) = &tags[value.index()].name
-                && may_be_named(function, value, expression)
+                && may_be_named(function, expression)
+                && !stored[value.index()]
+                && !is_constant(&function.expressions, value)
             {
                 names.insert(value, name.replace('.', "_"));
             }
@@ -62,23 +66,64 @@ pub(super) fn ids(module: &mut Module, tags: &[Vec<Tag>]) -> Vec<Vec<ValueId>> {
     all
 }
 
-/// Whether a writer may bind a value to a name: it is computed, and no pointer.
-fn may_be_named(function: &Function, value: Handle<Expression>, expression: &Expression) -> bool {
-    let _ = value;
-    match expression {
-        Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
-            let mut at = *base;
-            loop {
-                match function.expressions[at] {
-                    Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
-                        at = base;
-                    }
-                    Expression::GlobalVariable(_) | Expression::LocalVariable(_) => return false,
-                    _ => return true,
-                }
+/// For each value, whether nothing is done with it but storing it in a variable, which has a name
+/// already.
+fn stored_alone(function: &Function, users: &[Vec<User>]) -> Vec<bool> {
+    let mut stored = vec![false; users.len()];
+    operands::walk(&function.body, &mut |statement| {
+        if let Statement::Store { value, .. } = statement {
+            stored[value.index()] = users[value.index()].len() == 1;
+        }
+    });
+    stored
+}
+
+/// Whether a value is an input, a uniform, or a part of one: these have paths of their own, and are not
+/// called after the variables and parameters that they are passed through.
+pub(super) fn is_place(expressions: &Arena<Expression>, mut value: Handle<Expression>) -> bool {
+    loop {
+        value = match expressions[value] {
+            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => base,
+            Expression::Load { pointer } => pointer,
+            Expression::Swizzle { vector, .. } => vector,
+            Expression::FunctionArgument(_) | Expression::GlobalVariable(_) => return true,
+            _ => return false,
+        }
+    }
+}
+
+/// Whether a value is made of literals alone.
+fn is_constant(expressions: &Arena<Expression>, value: Handle<Expression>) -> bool {
+    match &expressions[value] {
+        Expression::Literal(_) | Expression::ZeroValue(_) => true,
+        Expression::Splat { value, .. } => is_constant(expressions, *value),
+        Expression::Compose { components, .. } => components
+            .iter()
+            .all(|part| is_constant(expressions, *part)),
+        _ => false,
+    }
+}
+
+/// Whether a writer may bind a value to a name: it is computed, no pointer, and not just what a variable
+/// holds.
+fn may_be_named(function: &Function, expression: &Expression) -> bool {
+    let leads_into_memory = |mut at: Handle<Expression>| {
+        loop {
+            match function.expressions[at] {
+                Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => at = base,
+                Expression::GlobalVariable(_) | Expression::LocalVariable(_) => return true,
+                _ => return false,
             }
         }
-        other => !other.needs_pre_emit(),
+    };
+    match *expression {
+        Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
+            !leads_into_memory(base)
+        }
+        Expression::Load { pointer } => {
+            !matches!(function.expressions[pointer], Expression::LocalVariable(_))
+        }
+        ref other => !other.needs_pre_emit(),
     }
 }
 
