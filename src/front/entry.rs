@@ -1,6 +1,6 @@
 //! Entry points: which two lodc works on, and what they are fed.
 
-use super::names::{listed, nearest, whole_word};
+use super::names::{function_name, listed, nearest, whole_word};
 use crate::{Diagnostic, Result};
 use naga::{Binding, Handle, Module, ShaderStage, Span, Type, TypeInner};
 
@@ -37,7 +37,7 @@ pub fn inputs(module: &Module, entry: usize, text: &str) -> Vec<Input> {
             (Some(binding), _) => {
                 let name = argument.name.clone().unwrap_or_default();
                 // naga keeps no span of an argument: it is the first such word after the function's name.
-                let span = whole_word(text, 0..text.len(), &entry.name)
+                let span = function_name(text, &entry.name)
                     .and_then(|at| whole_word(text, at.end..text.len(), &name));
                 inputs.push(Input {
                     name,
@@ -86,7 +86,7 @@ pub(super) fn choose(
         let found = Diagnostic::error(message).with_source(name, text);
         names
             .iter()
-            .filter_map(|n| whole_word(text, 0..text.len(), n))
+            .filter_map(|n| function_name(text, n))
             .fold(found, |d, place| d.with_label(place, ""))
     };
     let pick = |what: &str, have: &[&str], wanted: Option<&str>| match (wanted, have) {
@@ -138,6 +138,7 @@ pub(super) fn choose(
             none.with_note("lodc works on a function marked `@fragment`")
         });
     };
+    check_colour(name, text, module, &fragment)?;
     let vertex = pick("vertex", &vertices, stages.vertex.as_deref())?;
     if let Some(vertex) = &vertex {
         check_link(name, text, module, vertex, &fragment)?;
@@ -147,6 +148,32 @@ pub(super) fn choose(
 
 fn stage_name(stage: ShaderStage) -> String {
     format!("{stage:?}").to_lowercase()
+}
+
+/// The fragment stage must return a colour: that is what variants are compared by.
+fn check_colour(name: &str, text: &str, module: &Module, fragment: &str) -> Result<()> {
+    let mut entries = module.entry_points.iter();
+    let entry = entries.find(|e| e.stage == ShaderStage::Fragment && e.name == fragment);
+    let is_colour =
+        |binding: &Option<Binding>| matches!(binding, Some(Binding::Location { location: 0, .. }));
+    let returns =
+        entry
+            .and_then(|e| e.function.result.as_ref())
+            .is_some_and(|result| match &module.types[result.ty].inner {
+                TypeInner::Struct { members, .. } => members.iter().any(|m| is_colour(&m.binding)),
+                _ => is_colour(&result.binding),
+            });
+    if returns {
+        return Ok(());
+    }
+    let error = Diagnostic::error(format!("`{fragment}` returns no colour at location 0"))
+        .with_source(name, text);
+    let error = match function_name(text, fragment) {
+        Some(place) => error.with_label(place, "what it returns is compared"),
+        None => error,
+    };
+    Err(error
+        .with_note("lodc measures levels by their colours: return one as `@location(0) vec4f`"))
 }
 
 /// Every location that the fragment stage reads must be written by the vertex stage, in a type that fits.
@@ -303,6 +330,24 @@ mod tests {
             ["it has the functions `shade`: mark one with `@fragment`"]
         );
         assert!(none("const a = 1;").notes[0].contains("@fragment"));
+    }
+
+    #[test]
+    fn a_fragment_without_a_colour_is_refused() {
+        for result in ["", "-> @builtin(frag_depth) f32", "-> @location(1) vec4f"] {
+            let body = match result {
+                "" => "",
+                r if r.ends_with("f32") => "return 1.0;",
+                _ => "return vec4f();",
+            };
+            let text = format!("@fragment fn fs() {result} {{ {body} }}");
+            let error = Source::parse("a.wgsl", text).unwrap_err();
+            assert_eq!(error.message, "`fs` returns no colour at location 0");
+            assert_eq!(error.labels[0].0, 13..15);
+        }
+        let several = "struct O { @location(1) n: vec4f, @location(0) c: vec4f }
+            @fragment fn fs() -> O { return O(); }";
+        assert!(Source::parse("a.wgsl", several).is_ok());
     }
 
     #[test]

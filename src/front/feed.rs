@@ -106,6 +106,18 @@ impl Feed {
         }
     }
 
+    /// The first keyword of a stage that fits a type, or else zeros: a line to start from.
+    pub(crate) fn suggestion(ty: &TypeInner, stage: ShaderStage) -> String {
+        let named = Self::keywords(stage).filter_map(Self::of_keyword);
+        let fitting = named.into_iter().find(|feed| feed.fits(ty).is_ok());
+        match (fitting, shape(ty)) {
+            (Some(feed), Some((size, _))) if size > 1 => feed.to_toml(),
+            (_, Some((1, scalar))) if scalar.kind == ScalarKind::Float => "0.0".to_owned(),
+            (_, Some((1, _)) | None) => "0".to_owned(),
+            (_, Some((size, _))) => format!("[{}]", vec!["0"; size].join(", ")),
+        }
+    }
+
     /// Whether a stage's inputs can carry it.
     pub fn is_of(&self, stage: ShaderStage) -> bool {
         match self {

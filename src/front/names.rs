@@ -53,7 +53,21 @@ pub(crate) fn nearest<'n>(
         })
         .collect();
     near.sort();
-    near.into_iter().map(|(_, name)| name).take(most).collect()
+    // The second best is no help when the best is much nearer.
+    let enough = near.first().map_or(0, |(d, _)| d + 1);
+    let near = near.into_iter().take_while(|(d, _)| *d <= enough);
+    near.map(|(_, name)| name).take(most).collect()
+}
+
+/// A type's name with its article.
+pub(crate) fn article(name: &str) -> String {
+    // Scalars are spelt out: an f32, an i32, a u32.
+    let spelt = ["f", "i"].iter().any(|letter| {
+        let rest = name.strip_prefix(letter);
+        rest.is_some_and(|r| r.starts_with(|c: char| c.is_ascii_digit()))
+    });
+    let an = spelt || name.starts_with('a');
+    format!("{} {name}", if an { "an" } else { "a" })
 }
 
 /// How many characters must be put in, left out or changed to make one text of the other.
@@ -97,6 +111,21 @@ pub(crate) fn whole_word(text: &str, within: Range<usize>, word: &str) -> Option
     })
 }
 
+/// The byte range of a function's name where it is declared: behind `fn`, so that a mention in a comment
+/// does not count.
+pub(crate) fn function_name(text: &str, name: &str) -> Option<Range<usize>> {
+    let mut from = 0;
+    while let Some(keyword) = whole_word(text, from..text.len(), "fn") {
+        let rest = &text[keyword.end..];
+        let start = keyword.end + rest.len() - rest.trim_start().len();
+        if whole_word(text, start..text.len(), name).is_some_and(|found| found.start == start) {
+            return Some(start..start + name.len());
+        }
+        from = keyword.end;
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,8 +154,24 @@ mod tests {
         assert_eq!(nearest("roughnes", names, 2), ["roughness"]);
         assert_eq!(nearest("base_colour", names, 2), ["base_color"]);
         assert_eq!(nearest("view_proj", names, 2), ["camera.view_proj"]);
+        let members = ["paint.gloss", "paint.mode", "paint.tint"];
+        assert_eq!(nearest("paint.glos", members, 3), ["paint.gloss"]);
         assert!(nearest("xyz", names, 2).is_empty());
         assert_eq!(edit_distance("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn articles_are_as_spoken() {
+        for (name, spoken) in [
+            ("f32", "an f32"),
+            ("i32", "an i32"),
+            ("u32", "a u32"),
+            ("array<f32, 2>", "an array<f32, 2>"),
+            ("vec3<f32>", "a vec3<f32>"),
+            ("fog", "a fog"),
+        ] {
+            assert_eq!(article(name), spoken);
+        }
     }
 
     #[test]
@@ -136,6 +181,13 @@ mod tests {
         assert_eq!(whole_word(text, 6..text.len(), "uv"), None);
         assert_eq!(whole_word(text, 0..text.len(), ""), None);
         assert_eq!(whole_word(text, 9..99, "uv"), None);
+    }
+
+    #[test]
+    fn functions_are_found_where_they_are_declared() {
+        let text = "// fs is here\nfn fsx() {}\nfn  fs() { fs }";
+        assert_eq!(function_name(text, "fs"), Some(30..32));
+        assert_eq!(function_name(text, "gs"), None);
     }
 
     #[test]

@@ -227,8 +227,8 @@ fn readable(remark: &str) -> &str {
     }
 }
 
-/// A message of naga in the manner of ours: no capital, no full stop, and no arena indices (`[12]`), which
-/// say nothing to a shader's author.
+/// A message of naga in the manner of ours: no capital, no full stop, types as WGSL writes them, and no arena
+/// indices (`[12]`), which say nothing to a shader's author.
 fn uncapitalised(message: &str) -> String {
     let mut plain = String::new();
     let mut rest = message.trim_end_matches('.');
@@ -242,8 +242,17 @@ fn uncapitalised(message: &str) -> String {
         let end = open + if index { digits + 3 } else { 2 };
         plain.push_str(&rest[..if index { open } else { end }]);
         rest = &rest[end..];
+        // What has no name but its index is `it`, unless its type follows.
+        let word = plain.rsplit(' ').next().unwrap_or("");
+        if index
+            && !rest.starts_with(" (of type")
+            && ["for", "of", "to", "by", "with"].contains(&word)
+        {
+            plain.push_str(" it");
+        }
     }
     plain.push_str(rest);
+    let plain = wgsl_types(plain);
     // `WGSL`, `I32`: not a sentence's first word.
     let mut chars = plain.chars();
     match (chars.next(), chars.as_str()) {
@@ -252,6 +261,44 @@ fn uncapitalised(message: &str) -> String {
         }
         _ => plain,
     }
+}
+
+/// A message in which naga's types, as Rust prints them, are those of WGSL.
+fn wgsl_types(mut message: String) -> String {
+    if !message.contains("Scalar") && !message.contains("kind:") {
+        return message;
+    }
+    for (kind, width, name) in [
+        ("Float", 2, "f16"),
+        ("Float", 4, "f32"),
+        ("Float", 8, "f64"),
+        ("Sint", 4, "i32"),
+        ("Sint", 8, "i64"),
+        ("Uint", 4, "u32"),
+        ("Uint", 8, "u64"),
+        ("Bool", 1, "bool"),
+    ] {
+        let scalar = format!("Scalar {{ kind: {kind}, width: {width} }}");
+        message = message
+            .replace(&format!("Scalar({scalar})"), name)
+            .replace(&scalar, name);
+        for (size, rows) in [("Bi", 2), ("Tri", 3), ("Quad", 4)] {
+            let vector = format!("Vector {{ size: {size}, scalar: {name} }}");
+            message = message.replace(&vector, &format!("vec{rows}<{name}>"));
+            for (columns, count) in [("Bi", 2), ("Tri", 3), ("Quad", 4)] {
+                let matrix =
+                    format!("Matrix {{ columns: {columns}, rows: {size}, scalar: {name} }}");
+                message = message.replace(&matrix, &format!("mat{count}x{rows}<{name}>"));
+            }
+        }
+    }
+    while let Some((before, rest)) = message.split_once("(of type ") {
+        let Some((ty, after)) = rest.split_once(')') else {
+            break;
+        };
+        message = format!("{before}{ty}{after}");
+    }
+    message
 }
 
 #[cfg(test)]
@@ -345,7 +392,17 @@ mod tests {
     fn messages_of_naga_are_put_in_our_manner() {
         for (naga, ours) in [
             ("Function [12] 'f' is invalid", "function 'f' is invalid"),
-            ("Expression [3] of [4] is bad.", "expression of is bad"),
+            ("Expression [3] of [4] is bad.", "expression of it is bad"),
+            ("Bindings for [1] conflict", "bindings for it conflict"),
+            (
+                "Operation Add can't work with [3] (of type Vector { size: Tri, scalar: Scalar { kind: Float, width: 4 } }) and [5] (of type Scalar(Scalar { kind: Sint, width: 4 }))",
+                "operation Add can't work with vec3<f32> and i32",
+            ),
+            (
+                "of type Matrix { columns: Quad, rows: Tri, scalar: Scalar { kind: Float, width: 4 } }",
+                "of type mat4x3<f32>",
+            ),
+            ("(of type Scalar", "(of type Scalar"),
             ("WGSL is [x]", "WGSL is [x]"),
             ("a [", "a ["),
             ("", ""),

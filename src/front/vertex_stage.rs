@@ -106,13 +106,7 @@ fn unknown_inputs(source: &Source, unknown: &[Input]) -> Box<Diagnostic> {
     let mut lines = String::from("say it in the scene:\n[attributes]");
     for input in unknown {
         let ty = &source.module.types[input.ty].inner;
-        let fitting = Feed::keywords(ShaderStage::Fragment)
-            .find(|k| Feed::of_keyword(k).is_some_and(|f| f.fits(ty).is_ok()));
-        let size = shape(ty).map_or(1, |(size, _)| size);
-        let value = match fitting {
-            Some(keyword) if size > 1 => format!("\"{keyword}\""),
-            _ => Feed::Constant(vec![0.0; size]).to_toml(),
-        };
+        let value = Feed::suggestion(ty, ShaderStage::Fragment);
         // A name is a bare key in TOML unless it is outside ASCII.
         let bare = input
             .name

@@ -229,15 +229,8 @@ fn unknown_inputs(source: &Source, toml: Toml, unknown: &[&Input]) -> Box<Diagno
         .iter()
         .map(|input| {
             let ty = &source.module.types[input.ty].inner;
-            let fitting = Feed::keywords(ShaderStage::Vertex)
-                .filter_map(Feed::of_keyword)
-                .find(|feed| feed.fits(ty).is_ok());
-            let size = match *ty {
-                TypeInner::Vector { size, .. } => size as usize,
-                _ => 1,
-            };
-            let feed = fitting.unwrap_or_else(|| Feed::Constant(vec![0.0; size]));
-            Inference::new("attributes", &input.name, &feed.to_toml()).line_to_add
+            let value = Feed::suggestion(ty, ShaderStage::Vertex);
+            Inference::new("attributes", &input.name, &value).line_to_add
         })
         .collect();
     located
@@ -317,7 +310,7 @@ mod tests {
             "what feeds the vertex inputs `wibble` and `id` is not known"
         );
         assert!(
-            error.notes[0].contains("[attributes]\nwibble = \"position\"\nid = [0.0, 0.0]"),
+            error.notes[0].contains("[attributes]\nwibble = \"position\"\nid = [0, 0]"),
             "{error}"
         );
         assert!(error.to_string().contains("a.wgsl:4:"), "{error}");

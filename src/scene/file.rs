@@ -243,7 +243,8 @@ pub(super) fn suggest(error: Box<Diagnostic>, wanted: &str, known: &[&str]) -> B
         ([], known) => {
             let few = listed(known.iter().copied().take(12));
             let more = if known.len() > 12 { ", and more" } else { "" };
-            error.with_note(format!("there is {few}{more}"))
+            let verb = if known.len() > 1 { "are" } else { "is" };
+            error.with_note(format!("there {verb} {few}{more}"))
         }
         (near, _) => error.with_note(format!(
             "did you mean {}?",
@@ -318,7 +319,7 @@ mod tests {
             (message.as_str(), place.as_str()),
             ("unknown key `zzz`", "zzz")
         );
-        assert_eq!(notes, ["there is `nearest` and `farthest`"]);
+        assert_eq!(notes, ["there are `nearest` and `farthest`"]);
     }
 
     #[test]

@@ -10,8 +10,9 @@ use super::semantic::Semantic;
 use super::{Inference, Missing};
 use crate::eval::machine::Resource;
 use crate::front::Source;
-use crate::front::names::words;
+use crate::front::names::{article, words};
 use crate::{Diagnostic, Result};
+use naga::valid::GlobalUse;
 use naga::{AddressSpace, GlobalVariable, Handle, Module, ScalarKind};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -226,7 +227,11 @@ pub(super) fn resolve(
                 "",
             ));
         }
-        let used = Used::of(source, handle);
+        let mut used = Used::of(source, handle);
+        if is_written(source, handle) {
+            // The evaluator refuses the write, at its place; what the buffer holds is no question then.
+            used = Used::Nothing;
+        }
         let mut parts = Vec::new();
         if layout.has_runtime_array(variable.ty) && runtime == 0 && used.any() {
             // The runtime array is the last member: its one element is what comes with a length of 1.
@@ -248,9 +253,9 @@ pub(super) fn resolve(
             if leaf.width != 4 {
                 return Err(source.error(
                     format!(
-                        "`{}` is a {}, which the evaluator does not run",
+                        "`{}` is {}, which the evaluator does not run",
                         leaf.path,
-                        leaf.type_name()
+                        article(&leaf.type_name())
                     ),
                     source.variable(handle),
                     "",
@@ -283,6 +288,18 @@ pub(super) fn resolve(
         });
     }
     Ok(buffers)
+}
+
+/// Whether a chosen entry point writes to a variable.
+fn is_written(source: &Source, handle: Handle<GlobalVariable>) -> bool {
+    let entries = [
+        Some(source.fragment_entry().0),
+        source.vertex_entry().map(|(i, _)| i),
+    ];
+    entries.into_iter().flatten().any(|i| {
+        let uses = source.info.get_entry_point(i)[handle];
+        uses.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC)
+    })
 }
 
 /// Whether a path is a place or lies within it.
@@ -359,7 +376,7 @@ pub(super) fn missing_error(source: &Source, file: &str, missing: &[Missing]) ->
             error = source.locate(
                 error,
                 one.span,
-                format!("`{}` is a {}", one.what, one.type_name),
+                format!("`{}` is {}", one.what, article(&one.type_name)),
             );
         }
     }
@@ -579,20 +596,24 @@ mod tests {
                 "there is no uniform `s.lamps.power`",
                 "\"s.lamps.power\"",
             ),
-            ("\"s.gloss\" = true", "`s.gloss` is a f32", "true"),
-            ("\"s.gloss\" = nan", "`s.gloss` is a f32", "nan"),
-            ("\"s.gloss\" = 1e300", "`s.gloss` is a f32", "1e300"),
+            ("\"s.gloss\" = true", "`s.gloss` is an f32", "true"),
+            ("\"s.gloss\" = nan", "`s.gloss` is an f32", "nan"),
+            ("\"s.gloss\" = 1e300", "`s.gloss` is an f32", "1e300"),
             ("\"s.tint\" = [1, 2]", "`s.tint` is a vec3<f32>", "[1, 2]"),
             ("\"s.tint\" = 1", "`s.tint` is a vec3<f32>", "1"),
             ("\"s.mode\" = -1", "`s.mode` is a u32", "-1"),
             ("\"s.mode\" = 0.5", "`s.mode` is a u32", "0.5"),
-            ("\"s.bias\" = 3000000000", "`s.bias` is a i32", "3000000000"),
+            (
+                "\"s.bias\" = 3000000000",
+                "`s.bias` is an i32",
+                "3000000000",
+            ),
             (
                 "\"s.turn\" = [1, 2, 3]",
                 "`s.turn` is a mat3x3<f32>",
                 "[1, 2, 3]",
             ),
-            ("\"s.lamps\" = [1]", "`s.lamps` is a array<Lamp, 2>", "[1]"),
+            ("\"s.lamps\" = [1]", "`s.lamps` is an array<Lamp, 2>", "[1]"),
             ("\"s.lamps[0]\" = [1]", "`s.lamps[0]` is a Lamp", "[1]"),
             (
                 "\"s.eye\" = \"camera-postion\"",
@@ -657,6 +678,25 @@ mod tests {
                 .message
                 .contains("no storage buffer")
         );
+    }
+
+    #[test]
+    fn buffers_that_are_written_need_no_values() {
+        let source = Source::parse(
+            "a.wgsl",
+            "@group(0) @binding(0) var<storage, read_write> hits: array<atomic<u32>>;
+            @fragment fn fs() -> @location(0) vec4f { atomicAdd(&hits[0], 1u); return vec4f(); }",
+        )
+        .unwrap();
+        let mut said = Said::default();
+        let none = Entries::default();
+        let toml = Toml {
+            name: "a.toml",
+            text: "",
+        };
+        let buffers = resolve(&source, toml, &none, &none, &mut said).unwrap();
+        assert!(said.missing.is_empty());
+        assert_eq!(bytes(&buffers[0], 0), [0.0]);
     }
 
     #[test]

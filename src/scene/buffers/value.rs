@@ -3,6 +3,7 @@
 use super::{Fill, bound, is_in, root};
 use crate::Result;
 use crate::front::Source;
+use crate::front::names::{article, listed};
 use crate::scene::file::{Entries, Node, Toml, suggest};
 use crate::scene::layout::{Layout, Leaf, Place};
 use crate::scene::semantic::Semantic;
@@ -56,7 +57,7 @@ pub(super) fn read_entry<'f>(
                         .error(
                             format!("`{path}` cannot be the {keyword}"),
                             value.span(),
-                            format!("it is a {}", layout.type_name(place.ty)),
+                            format!("it is {}", article(&layout.type_name(place.ty))),
                         )
                         .with_note(format!("the {keyword} is {}", semantic.wants())));
                 }
@@ -139,9 +140,9 @@ fn find(
                 end.path, end.path
             )),
             None if names.is_empty() => error.with_note(format!(
-                "`{}` is a {}, which has no parts",
+                "`{}` is {}, which has no parts",
                 end.path,
-                layout.type_name(end.ty)
+                article(&layout.type_name(end.ty))
             )),
             None => suggest(error, path, &names),
         }
@@ -300,7 +301,11 @@ impl Reader<'_> {
         let wrong = |wants: String| {
             self.toml
                 .error(
-                    format!("`{}` is a {}", place.path, self.layout.type_name(place.ty)),
+                    format!(
+                        "`{}` is {}",
+                        place.path,
+                        article(&self.layout.type_name(place.ty))
+                    ),
                     value.span(),
                     format!("this is {}", describe(value.get_ref())),
                 )
@@ -310,7 +315,7 @@ impl Reader<'_> {
             let names: Vec<&str> = members.iter().map(|m| m.path.as_str()).collect();
             return Err(wrong(format!(
                 "give its members one by one: {}",
-                crate::front::names::listed(names)
+                listed(names)
             )));
         }
         if let Some((base, _, count)) = self.layout.array(place.ty) {
