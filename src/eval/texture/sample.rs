@@ -15,7 +15,7 @@ use lodc_passes::semantics::Real;
 /// One float a lane.
 pub type Floats = [f32; LANES];
 
-/// One integer a lane. An unsigned value above `i32::MAX` is given as `i32::MAX`.
+/// One integer a lane, an unsigned one by its bits: above `i32::MAX` it is clamped like a negative one.
 pub type Integers = [i32; LANES];
 
 /// How the MIP level is chosen.

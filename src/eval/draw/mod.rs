@@ -1,5 +1,8 @@
 //! Draws a frame: rasterises once, shades as often as there are variants.
 
+#[cfg(test)]
+mod tests;
+
 use super::image::Picture;
 use super::lane::{LANES, Words};
 use super::machine::{Bindings, Machine, Profile};
@@ -295,103 +298,4 @@ impl Job<'_> {
 fn merge(mut first: Profile, second: Profile) -> Profile {
     first.absorb(&second);
     first
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::eval::lane::Mask;
-    use crate::eval::machine::Probe;
-
-    /// Three fragments of two pixels: two on the first, in lanes 0 and 4.
-    fn coverage(depths: [f32; 3]) -> Coverage {
-        let mut block = Block {
-            inputs: Vec::new(),
-            active: Mask([0xff, 0, 0, 0]),
-            covered: Mask([0b1_0011, 0, 0, 0]),
-            pixels: [u32::MAX; LANES],
-            depths: [0.0; LANES],
-            first: 0,
-        };
-        for ((lane, pixel), depth) in [(0, 0), (1, 1), (4, 0)].into_iter().zip(depths) {
-            block.pixels[lane] = pixel;
-            block.depths[lane] = depth;
-        }
-        Coverage {
-            width: 2,
-            height: 1,
-            grid: 1,
-            blocks: vec![block],
-            fragments: 3,
-            slots: Vec::new(),
-            late: true,
-            vertex_profile: Profile::default(),
-        }
-    }
-
-    fn shading(alive: [bool; 3]) -> Shading {
-        Shading {
-            colours: vec![[1.0; 4], [2.0; 4], [3.0; 4]],
-            alive: alive.to_vec(),
-            ..Shading::default()
-        }
-    }
-
-    #[test]
-    fn the_nearest_alive_fragment_is_shown() {
-        let shown = |depths, alive| {
-            let picture = resolve(&coverage(depths), &shading(alive));
-            assert_eq!(picture.covered[0], f32::from(picture.pixels[0][0] > 0.0));
-            [picture.pixels[0][0], picture.pixels[1][0]]
-        };
-        assert_eq!(shown([0.2, 0.2, 0.5], [true; 3]), [1.0, 2.0]);
-        assert_eq!(shown([0.5, 0.2, 0.2], [true; 3]), [3.0, 2.0]);
-        assert_eq!(shown([0.2, 0.2, 0.2], [true; 3]), [1.0, 2.0]);
-        assert_eq!(shown([0.2, 0.2, 0.5], [false, true, true]), [3.0, 2.0]);
-        assert_eq!(shown([0.2, 0.2, 0.5], [false, true, false]), [0.0, 2.0]);
-    }
-
-    #[test]
-    fn a_returned_depth_counts() {
-        let coverage = coverage([0.2, 0.2, 0.5]);
-        let mut shading = shading([true; 3]);
-        shading.depths = vec![0.9, 1.0, 0.8];
-        let picture = resolve(&coverage, &shading);
-        assert_eq!((picture.pixels[0][0], picture.covered[1]), (3.0, 0.0));
-        shading.depths = vec![0.9, -2.0, f32::NAN];
-        let picture = resolve(&coverage, &shading);
-        assert_eq!((picture.pixels[0][0], picture.pixels[1][0]), (3.0, 2.0));
-    }
-
-    #[test]
-    fn what_is_hidden_is_not_seen() {
-        let seen = seen(&coverage([0.5, 0.2, 0.2]), &shading([true; 3]));
-        assert_eq!(seen.fragments, 2);
-        let block = &seen.blocks[0];
-        assert_eq!(block.covered, Mask([0b1_0010, 0, 0, 0]));
-        assert_eq!(block.active, Mask([0xff, 0, 0, 0]));
-        assert_eq!(block.pixels[..5], [u32::MAX, 1, u32::MAX, u32::MAX, 0]);
-    }
-
-    #[test]
-    fn profiles_add_up() {
-        let profile = |min, max| Profile {
-            lanes: 2,
-            probes: vec![vec![Probe {
-                count: 2,
-                sum: f64::from(min + max),
-                min,
-                max,
-            }]],
-            ..Profile::default()
-        };
-        let both = merge(profile(1.0, 2.0), profile(-1.0, 1.5));
-        let probe = both.probes[0][0];
-        assert_eq!((both.lanes, probe.count, probe.sum), (4, 4, 3.5));
-        assert_eq!((probe.min, probe.max), (-1.0, 2.0));
-        for (a, b) in [(f32::NAN, 1.0), (1.0, f32::NAN)] {
-            let probe = merge(profile(a, a), profile(b, b)).probes[0][0];
-            assert!(probe.min.is_nan() && probe.max.is_nan());
-        }
-    }
 }
