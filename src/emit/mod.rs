@@ -22,6 +22,9 @@ mod tidy;
 mod tokens;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 pub use lock::{FORMAT, Lock, LockedFile, LockedLevel, LockedSource, LockedTexture, figure, hash};
 pub use says::says;
 pub use write::write_atomically;

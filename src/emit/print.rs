@@ -402,3 +402,147 @@ pub(crate) fn value_name(
     let entry = shader.entry_point(stage)?;
     Some(short_name(shader.id(stage, value).path(), &entry.name))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The body of the function `f` of a text, written with names of values forgotten.
+    #[track_caller]
+    fn body(text: &str) -> String {
+        let mut module = naga::front::wgsl::parse_str(text).expect("it is WGSL");
+        for (_, function) in module.functions.iter_mut() {
+            function.named_expressions.clear();
+        }
+        let printed = print(
+            &module,
+            &Wishes {
+                keep: &|_| true,
+                taken: &Names::default(),
+                outside: &Names::default(),
+                value: &|_, _| None,
+                short_types: true,
+            },
+        )
+        .expect("it can be written");
+        let all: String = printed
+            .items
+            .iter()
+            .map(|item| item.text.as_str())
+            .collect();
+        naga::front::wgsl::parse_str(&all).unwrap_or_else(|e| panic!("{e}\n{all}"));
+        let f = printed
+            .items
+            .iter()
+            .find(|item| item.name == "f")
+            .expect("it is there");
+        let (_, body) = f.text.split_once("{\n").expect("it has a body");
+        body.trim_end().trim_end_matches('}').to_owned()
+    }
+
+    #[test]
+    fn a_load_does_not_move_past_a_store() {
+        let written = body("fn f(n: f32) -> f32 { var a = n; let k = a; a = 2.0; return k + a; }");
+        assert_eq!(
+            written,
+            "    var a = n;\n    let value = a;\n    a = 2.0;\n    return value + a;\n"
+        );
+        let written =
+            body("fn f(n: f32) -> f32 { var a = n; let k = a; var b = k; return a + b; }");
+        assert_eq!(
+            written,
+            "    var a = n;\n    var b = a;\n    return a + b;\n"
+        );
+        // The store is to another variable, or part of the statement that reads.
+        let written = body(
+            "fn f(n: f32) -> f32 { var a = n; var b = n; let k = a; b = 1.0; a = k * b; return a; }",
+        );
+        assert_eq!(
+            written,
+            "    var a = n;\n    var b = n;\n    b = 1.0;\n    a *= b;\n    return a;\n"
+        );
+    }
+
+    #[test]
+    fn a_load_does_not_move_past_a_call_that_may_store() {
+        let written = body(
+            "fn up(p: ptr<function, f32>) -> f32 { *p = 3.0; return 1.0; }
+             fn f() -> f32 { var a = 1.0; return a + up(&a); }",
+        );
+        assert!(written.contains("= a;\n"), "{written}");
+    }
+
+    #[test]
+    fn a_load_does_not_move_into_a_loop_that_stores() {
+        let written = body(
+            "fn f(n: i32) -> i32 {
+                 var a = n; let k = a; var i = 0;
+                 loop { if i > k { break; } i = i + k; a = 7; }
+                 return i;
+             }",
+        );
+        assert!(written.contains("let value = a;\n"), "{written}");
+        let written = body(
+            "fn f(n: i32) -> i32 {
+                 var a = n; let k = a; var i = 0;
+                 loop { if i > k { break; } i = i + k; }
+                 return i;
+             }",
+        );
+        assert!(!written.contains("let"), "{written}");
+    }
+
+    #[test]
+    fn a_store_to_a_part_counts() {
+        let written = body(
+            "fn f(n: f32) -> f32 { var a = vec2f(n); let k = a; a.x = 2.0; return k.x + a.y; }",
+        );
+        assert!(written.contains("let value = a;\n"), "{written}");
+    }
+
+    #[test]
+    fn samples_stay_within_straight_line_code() {
+        let head =
+            "@group(0) @binding(0) var t: texture_2d<f32>; @group(0) @binding(1) var s: sampler;";
+        let written = body(&format!(
+            "{head} fn f(v: vec2f) -> f32 {{ let c = textureSample(t, s, v); return c.x; }}"
+        ));
+        assert_eq!(written, "    return textureSample(t, s, v).x;\n");
+        for text in [
+            "fn f(v: vec2f) -> f32 { let c = textureSample(t, s, v); if v.x > 0.5 { return c.x; } return 0.0; }",
+            "fn f(v: vec2f) -> f32 { let c = textureSample(t, s, v); return c.x + c.y; }",
+            "fn f(v: vec2f) -> f32 { let c = dpdx(v.x); if v.x > 0.5 { return 0.0; } return c; }",
+        ] {
+            let written = body(&format!("{head} {text}"));
+            assert!(written.starts_with("    let value = "), "{written}");
+        }
+    }
+
+    #[test]
+    fn long_expressions_get_lines() {
+        let terms: Vec<String> = (0..40).map(|n| format!("sqrt(v * {n}.5)")).collect();
+        let written = body(&format!(
+            "fn f(v: f32) -> f32 {{ return {}; }}",
+            terms.join(" + ")
+        ));
+        assert!(written.lines().count() > 2, "{written}");
+        assert!(written.lines().all(|line| line.len() < 160), "{written}");
+    }
+
+    #[test]
+    fn numbers_alone_keep_their_type() {
+        let text = "const A = 3.5; fn f(v: f32) -> f32 { return v + pow(2.0, A) + v * 2.0; }";
+        let written = body(text);
+        assert!(written.contains("2.0"), "{written}");
+    }
+
+    #[test]
+    fn names_are_short_and_whole() {
+        assert_eq!(short_name("main.specular.pow", "main"), "specular_pow");
+        assert_eq!(short_name("main", "main"), "main");
+        assert_eq!(
+            short_name("main.shade.distribution_of_normals.half_vector.mul", "main"),
+            "half_vector_mul"
+        );
+    }
+}
