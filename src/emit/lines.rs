@@ -64,8 +64,11 @@ pub(crate) fn plan(module: &Module, function: &Function, info: &FunctionInfo) ->
         walk.evaluated[value.index()].is_some()
             && is_plain(info[value].ty.inner_with(&module.types))
     };
+    let passed_on = passed_on(function);
     for &value in function.named_expressions.keys() {
-        if may_be_named(value) {
+        // A value that is only stored or returned needs no name beside the variable's.
+        let is_passed_on = info[value].ref_count == 1 && passed_on.contains(&value);
+        if may_be_named(value) && !is_passed_on {
             lines.named.insert(value);
         }
     }
@@ -120,6 +123,19 @@ pub(crate) fn plan(module: &Module, function: &Function, info: &FunctionInfo) ->
     }
     lines.inline.extend(samples);
 
+    // Components of what has a name: `in.tangent.xyz` reads better than a name for it.
+    for (value, expression) in expressions.iter() {
+        if matches!(expression, Expression::Swizzle { .. })
+            && !lines.named.contains(&value)
+            && writer_names(value, &lines)
+            && is_path(function, value, &|value| {
+                lines.inline.contains(&value) != writer_names(value, &lines)
+            })
+        {
+            lines.inline.insert(value);
+        }
+    }
+
     name_long_ones(&mut lines, function, &may_be_named, &writer_names);
 
     // Local variables, once everything else has its place.
@@ -141,6 +157,35 @@ pub(crate) fn plan(module: &Module, function: &Function, info: &FunctionInfo) ->
     }
     lines.inline.extend(locals);
     lines
+}
+
+/// The values that statements store or return as they are.
+fn passed_on(function: &Function) -> BTreeSet<Handle<Expression>> {
+    let mut found = BTreeSet::new();
+    operands::walk(&function.body, &mut |statement| match statement {
+        Statement::Store { value, .. } | Statement::Return { value: Some(value) } => {
+            found.insert(*value);
+        }
+        _ => {}
+    });
+    found
+}
+
+/// Whether a value is a part of something that is read by its name: an argument, what `has_name` says, or
+/// memory that is read in place.
+fn is_path(
+    function: &Function,
+    value: Handle<Expression>,
+    has_name: &dyn Fn(Handle<Expression>) -> bool,
+) -> bool {
+    match function.expressions[value] {
+        Expression::FunctionArgument(_) => true,
+        Expression::Swizzle { vector: base, .. } | Expression::AccessIndex { base, .. } => {
+            has_name(base) || is_path(function, base, has_name)
+        }
+        Expression::Load { .. } => true,
+        _ => false,
+    }
 }
 
 /// Gives a line to what would be too long in place, from the operands up.

@@ -50,12 +50,31 @@ impl Names {
         self.take(wish)
     }
 
-    /// Finds a free name for a wish, and takes it: the wish itself, or with `_b`, `_c`, ... behind it.
+    /// Finds a free name for a wish, and takes it: the wish itself, or with `_b`, `_c`, ... behind it. Such
+    /// names keep their form when naga writes them again.
     pub(crate) fn take(&mut self, wish: &str) -> String {
+        self.first_free(wish, letters, Self::is_free)
+    }
+
+    /// As [`Names::take`], for what is local to a function: with `_2`, `_3`, ... behind it. What is predeclared
+    /// may be hidden there, but for the words that the function uses.
+    pub(crate) fn take_local(&mut self, wish: &str, used: &BTreeSet<String>) -> String {
+        let is_free = |names: &Self, name: &str| {
+            !names.0.contains(name) && !used.contains(name) && !RESERVED.contains(&name)
+        };
+        self.first_free(wish, |n| (n + 1).to_string(), is_free)
+    }
+
+    fn first_free(
+        &mut self,
+        wish: &str,
+        number: impl Fn(usize) -> String,
+        is_free: impl Fn(&Self, &str) -> bool,
+    ) -> String {
         let wish = identifier(wish);
         let name = std::iter::once(wish.clone())
-            .chain((1..).map(|n| format!("{wish}_{}", letters(n))))
-            .find(|name| self.is_free(name))
+            .chain((1..).map(|n| format!("{wish}_{}", number(n))))
+            .find(|name| is_free(self, name))
             .unwrap_or(wish);
         self.0.insert(name.clone());
         name
@@ -145,6 +164,12 @@ mod tests {
         assert_eq!(names.take("mix"), "mix_b");
         assert_eq!(names.take("fn"), "fn_b");
         assert_eq!(names.take("vec3f"), "vec3f_b");
+        let used = BTreeSet::from(["mix".to_owned()]);
+        assert_eq!(names.take_local("lod", &used), "lod_2");
+        assert_eq!(names.take_local("lod", &used), "lod_3");
+        assert_eq!(names.take_local("mix", &used), "mix_2");
+        assert_eq!(names.take_local("distance", &used), "distance");
+        assert_eq!(names.take_local("fn", &used), "fn_2");
     }
 
     #[test]

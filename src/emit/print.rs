@@ -8,7 +8,7 @@ use super::lines;
 use super::names::{Names, letters};
 use super::source::{Keyword, Text};
 use super::tidy::{Style, tidy, with_short_types};
-use super::tokens::{Kind, tokens};
+use super::tokens::{Kind, tokens, words};
 use crate::front;
 use lodc_passes::shader::Stage;
 use naga::back::wgsl::WriterFlags;
@@ -155,9 +155,15 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     };
     for declaration in &text.declarations {
         let raw = &written[declaration.span.clone()];
-        let scope = owners
+        let mut scope = owners
             .get(&declaration.name)
             .and_then(|at| scopes.get_mut(*at));
+        if let Some(scope) = &mut scope {
+            let used = words(raw)
+                .into_iter()
+                .filter(|word| !labels.names.contains_key(*word));
+            scope.predeclared = used.map(str::to_owned).collect();
+        }
         let tidied = match &scope {
             Some(scope) => scope.tidied(raw, wishes.short_types),
             None if wishes.short_types => with_short_types(raw),
@@ -280,8 +286,12 @@ impl Labels {
 struct Scope {
     owner: Owner,
     taken: Names,
+    /// Words of the function that mean something predeclared.
+    predeclared: BTreeSet<String>,
     /// Placeholders and numbered values that have their names.
     given: BTreeMap<String, String>,
+    /// Placeholders of arguments and variables, and the names that they should have.
+    variables: BTreeMap<String, String>,
     /// Placeholders of values.
     values: BTreeMap<String, (Handle<Expression>, Option<String>)>,
     expressions: BTreeMap<usize, Handle<Expression>>,
@@ -299,7 +309,9 @@ impl Scope {
         let mut scope = Self {
             owner,
             taken: taken.clone(),
+            predeclared: BTreeSet::new(),
             given: BTreeMap::new(),
+            variables: BTreeMap::new(),
             values: BTreeMap::new(),
             expressions: function
                 .expressions
@@ -316,19 +328,16 @@ impl Scope {
                 bare_numbers: plan.bare_numbers,
             },
         };
-        for argument in &mut function.arguments {
-            let name = scope
-                .taken
-                .take(argument.name.as_deref().unwrap_or("input"));
-            let label = labels.add(name.clone());
-            scope.given.insert(label.clone(), name);
-            argument.name = Some(label);
-        }
-        for (_, local) in function.local_variables.iter_mut() {
-            let name = scope.taken.take(local.name.as_deref().unwrap_or("local"));
-            let label = labels.add(name.clone());
-            scope.given.insert(label.clone(), name);
-            local.name = Some(label);
+        let arguments = function
+            .arguments
+            .iter_mut()
+            .map(|a| (&mut a.name, "input"));
+        let locals = function.local_variables.iter_mut();
+        for (name, fallback) in arguments.chain(locals.map(|(_, l)| (&mut l.name, "local"))) {
+            let label = labels.add(String::new());
+            let wish = name.take().unwrap_or_else(|| fallback.to_owned());
+            scope.variables.insert(label.clone(), wish);
+            *name = Some(label);
         }
         let own_names = std::mem::take(&mut function.named_expressions);
         for value in plan.named {
@@ -363,34 +372,29 @@ impl Scope {
         if let Some(name) = self.given.get(word) {
             return Some(name.clone());
         }
-        let (value, own) = match self.values.get(word) {
-            Some((value, own)) => (*value, own.clone()),
-            None => {
+        let wish = match (self.variables.get(word), self.values.get(word)) {
+            (Some(wish), _) | (_, Some((_, Some(wish)))) => Some(wish.clone()),
+            (None, Some((value, None))) => (wishes.value)(self.owner, *value),
+            (None, None) => {
                 let index = word.strip_prefix("_e")?.parse::<usize>().ok()?;
-                (*self.expressions.get(&index)?, None)
+                (wishes.value)(self.owner, *self.expressions.get(&index)?)
             }
         };
-        let wish = own
-            .or_else(|| (wishes.value)(self.owner, value))
-            .unwrap_or_else(|| "value".to_owned());
-        let name = self.taken.take(&wish);
+        let wish = wish.as_deref().unwrap_or("value");
+        let name = self.taken.take_local(wish, &self.predeclared);
         self.given.insert(word.to_owned(), name.clone());
         Some(name)
     }
 }
 
-/// A short name for a value from the path of its id: without the function's name, and without what is far
-/// from the value when the path is long.
+/// A short name for a value from the path of its id: the last two parts, without the entry point's name.
 pub(crate) fn short_name(path: &str, entry_point: &str) -> String {
-    const LONG: usize = 32;
-    let mut parts: Vec<&str> = path.split('.').collect();
-    if parts.len() > 1 && parts[0] == entry_point {
-        parts.remove(0);
-    }
-    while parts.len() > 2 && parts.iter().map(|part| part.len() + 1).sum::<usize>() > LONG {
-        parts.remove(0);
-    }
-    parts.join("_")
+    let parts: Vec<&str> = path.split('.').collect();
+    let from = match &*parts {
+        [first, _, ..] if *first == entry_point => 1,
+        _ => 0,
+    };
+    parts[from.max(parts.len().saturating_sub(2))..].join("_")
 }
 
 /// Wishes for the values of a shader in normal form.
@@ -541,8 +545,8 @@ mod tests {
         assert_eq!(short_name("main.specular.pow", "main"), "specular_pow");
         assert_eq!(short_name("main", "main"), "main");
         assert_eq!(
-            short_name("main.shade.distribution_of_normals.half_vector.mul", "main"),
-            "half_vector_mul"
+            short_name("main.shade.half_vector.mul_2", "main"),
+            "half_vector_mul_2"
         );
     }
 }

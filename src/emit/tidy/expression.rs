@@ -15,7 +15,9 @@ enum Level {
     Bits(char),
     /// `==` and `!=`.
     Equality,
-    /// `<`, `>` and the like: in an argument list they could be read as template brackets.
+    /// `<`: in an argument list it could be read as the start of a template's arguments.
+    Less,
+    /// `>`, `<=` and `>=`.
     Order,
     /// `&&` or `||`.
     Logic(char),
@@ -213,10 +215,7 @@ impl<'a> Reader<'a> {
     /// An expression between brackets and commas.
     fn argument(&mut self) -> Option<String> {
         let written = self.expression()?;
-        let fits = !matches!(
-            written.level,
-            Level::Order | Level::Bits('<') | Level::Bits('>')
-        );
+        let fits = written.level != Level::Less;
         Some(written.parenthesised_unless(fits))
     }
 
@@ -253,7 +252,8 @@ fn join(left: Written, operator: &str, right: Written) -> Written {
         "*" | "/" | "%" => Product,
         "+" | "-" => Sum,
         "==" | "!=" => Equality,
-        "<" | "<=" | ">" | ">=" => Order,
+        "<" => Less,
+        "<=" | ">" | ">=" => Order,
         "&&" => Logic('&'),
         "||" => Logic('|'),
         "<<" => Bits('<'),
@@ -265,7 +265,7 @@ fn join(left: Written, operator: &str, right: Written) -> Written {
     let fits = |operand: Level, is_left: bool| match level {
         Product => alone(operand) || (is_left && operand == Product),
         Sum => alone(operand) || operand == Product || (is_left && operand == Sum),
-        Equality | Order => alone(operand) || matches!(operand, Product | Sum),
+        Equality | Less | Order => alone(operand) || matches!(operand, Product | Sum),
         Bits('<' | '>') => alone(operand),
         _ => alone(operand) || (is_left && operand == level),
     };

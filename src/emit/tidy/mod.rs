@@ -197,10 +197,7 @@ mod tests {
         becomes("let x = -(-1f);", "let x = -(-1.0);");
         becomes("let x = (a - -(b));", "let x = a - -b;");
         becomes("let x = -((a * b));", "let x = -(a * b);");
-        becomes(
-            "let x = f((a < b), (c > d));",
-            "let x = f((a < b), (c > d));",
-        );
+        becomes("let x = f((a < b), (c > d));", "let x = f((a < b), c > d);");
         becomes("let x = ((a & b) | c);", "let x = (a & b) | c;");
         becomes("let x = ((a << b) + 1u);", "let x = (a << b) + 1u;");
         becomes("(*p).x = (a + b).x;", "(*p).x = (a + b).x;");
