@@ -8,8 +8,8 @@
 use lodc_passes::operands;
 use naga::valid::FunctionInfo;
 use naga::{
-    AddressSpace, Block, Expression, Function, Handle, ImageClass, Module, Statement,
-    StorageAccess, TypeInner,
+    AddressSpace, BinaryOperator, Block, Expression, Function, Handle, ImageClass, Module,
+    Statement, StorageAccess, TypeInner,
 };
 use std::collections::BTreeSet;
 
@@ -310,6 +310,19 @@ impl Walk {
         value: Handle<Expression>,
         is_let: &dyn Fn(Handle<Expression>) -> bool,
     ) {
+        // The right operand of these may not be evaluated.
+        if let Expression::Binary {
+            op: BinaryOperator::LogicalAnd | BinaryOperator::LogicalOr,
+            left,
+            right,
+        } = function.expressions[value]
+        {
+            self.operand(function, left, is_let);
+            self.epoch += 1;
+            self.operand(function, right, is_let);
+            self.epoch += 1;
+            return;
+        }
         operands::each(&function.expressions[value], |operand| {
             self.operand(function, operand, is_let);
         });

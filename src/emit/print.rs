@@ -414,7 +414,11 @@ mod tests {
     /// The body of the function `f` of a text, written with names of values forgotten.
     #[track_caller]
     fn body(text: &str) -> String {
-        let mut module = naga::front::wgsl::parse_str(text).expect("it is WGSL");
+        body_of(naga::front::wgsl::parse_str(text).expect("it is WGSL"))
+    }
+
+    #[track_caller]
+    fn body_of(mut module: Module) -> String {
         for (_, function) in module.functions.iter_mut() {
             function.named_expressions.clear();
         }
@@ -520,6 +524,33 @@ mod tests {
             let written = body(&format!("{head} {text}"));
             assert!(written.starts_with("    let value = "), "{written}");
         }
+    }
+
+    #[test]
+    fn samples_stay_out_of_what_may_not_be_evaluated() {
+        let text = "@group(0) @binding(0) var t: texture_2d<f32>; @group(0) @binding(1) var s: sampler;
+             fn f(v: vec2f) -> bool { let c = textureSample(t, s, v); return (v.x > 0.5) & (c.x > 0.5); }";
+        let mut module = naga::front::wgsl::parse_str(text).expect("it is WGSL");
+        assert!(!body_of(module.clone()).contains("let"));
+        // naga reads `&&` as a branch, but normal form has the operator.
+        for (_, function) in module.functions.iter_mut() {
+            for (_, expression) in function.expressions.iter_mut() {
+                if let Expression::Binary { op, .. } = expression
+                    && *op == naga::BinaryOperator::And
+                {
+                    *op = naga::BinaryOperator::LogicalAnd;
+                }
+            }
+        }
+        let written = body_of(module);
+        assert!(
+            written.starts_with("    let value = textureSample"),
+            "{written}"
+        );
+        assert!(
+            written.contains("(v.x > 0.5) && (value.x > 0.5)"),
+            "{written}"
+        );
     }
 
     #[test]
