@@ -3,6 +3,7 @@
 use crate::shader::{Shader, ValueId};
 use crate::{Facts, PASSES};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// What a simplification may change (Olano, section 2).
@@ -25,7 +26,8 @@ pub struct Candidate {
     pub pass: String,
     /// The value that is changed, or whose users are.
     pub site: ValueId,
-    /// What is done there, in the pass's own words: `mean`, `keep fs_main.specular.pow`.
+    /// What is done there, in the pass's own words: `mean`, `keep fs_main.specular.pow`. A value that it
+    /// names is written as its id, hash and all.
     pub choice: String,
     /// The numbers that it bakes, as the bits of an f32 each; empty when it bakes none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -59,7 +61,12 @@ impl Candidate {
 
 impl fmt::Display for Candidate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {}", self.pass, self.site.path(), self.choice)?;
+        write!(f, "{} {} ", self.pass, self.site.path())?;
+        match self.choice.split_once('#') {
+            // Hashes are for finding, not for reading.
+            Some((choice, _)) => f.write_str(choice)?,
+            None => f.write_str(&self.choice)?,
+        }
         let mut sep = " = ";
         for number in self.numbers() {
             write!(f, "{sep}{number}")?;
@@ -132,14 +139,19 @@ pub struct ReplayError {
 }
 
 impl Recipe {
-    /// Applies every candidate in order.
+    /// Applies every candidate in order. A site that was renamed in the base since is found by its hash.
     ///
     /// # Errors
     /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
     pub fn replay(&self, base: &Shader) -> Result<Shader, Box<ReplayError>> {
         let mut shader = base.clone();
         for (step, candidate) in self.0.iter().enumerate() {
-            shader = apply(&shader, candidate).map_err(|declined| {
+            let site = base.known_as(&candidate.site).unwrap_or(&candidate.site);
+            let here = Candidate {
+                site: site.clone(),
+                ..candidate.clone()
+            };
+            shader = apply(&shader, &here).map_err(|declined| {
                 Box::new(ReplayError {
                     step,
                     candidate: candidate.clone(),
@@ -170,6 +182,16 @@ pub fn candidates(shader: &Shader, facts: &Facts) -> Vec<Candidate> {
         .iter()
         .flat_map(|pass| pass.candidates(shader, facts))
         .collect()
+}
+
+/// Everything that the passes think of, by the value that it changes; pass by pass for each.
+pub fn considered(shader: &Shader, facts: &Facts) -> BTreeMap<ValueId, Vec<Considered>> {
+    let mut by_site: BTreeMap<ValueId, Vec<Considered>> = BTreeMap::new();
+    for considered in PASSES.iter().flat_map(|pass| pass.consider(shader, facts)) {
+        let site = considered.candidate.site.clone();
+        by_site.entry(site).or_default().push(considered);
+    }
+    by_site
 }
 
 /// The pass of a command-line name.

@@ -218,35 +218,43 @@ impl Shader {
         self.places(stage).users(value)
     }
 
-    /// Where a value is: by path and hash, else by path alone, else by a hash that only one value has.
+    /// Where a value is, by its path.
     pub fn find(&self, id: &ValueId) -> Option<(Stage, Handle<Expression>)> {
-        let all = || {
-            [Stage::Vertex, Stage::Fragment]
-                .into_iter()
-                .filter_map(|stage| Some((stage, self.index(stage)?)))
-                .flat_map(move |(stage, entry)| {
-                    let values = self.module.entry_points[entry].function.expressions.iter();
-                    let ids = self.ids[entry].iter();
-                    ids.zip(values)
-                        .map(move |(have, (handle, _))| (stage, handle, have))
-                })
-        };
         // Paths are unique, so the first is the only one. Ids are passed around by reference count:
         // most often the very same text is met.
         let same = |have: &Arc<str>| Arc::ptr_eq(have, &id.path) || **have == *id.path;
-        let by_path = all().find(|(_, _, have)| same(&have.path));
-        let found = match by_path {
-            Some(found) => Some(found),
-            None if id.hash != 0 => {
-                let mut with_hash = all().filter(|(_, _, have)| have.hash == id.hash);
-                match (with_hash.next(), with_hash.next()) {
-                    (Some(only), None) => Some(only),
-                    _ => None,
-                }
+        self.values()
+            .find(|(_, _, have)| same(&have.path))
+            .map(|(stage, value, _)| (stage, value))
+    }
+
+    /// What a value of another version of this shader's source is called here: the same, when that path
+    /// is there, else what the only value with its hash is called. To be asked of a shader that no pass
+    /// has changed: after a change, another value may be the only one left with that hash.
+    pub fn known_as(&self, id: &ValueId) -> Option<&ValueId> {
+        let mut with_path = self.values().map(|(_, _, have)| have);
+        let by_path = with_path.find(|have| have.path == id.path);
+        by_path.or_else(|| {
+            let values = self.values().map(|(_, _, have)| have);
+            let mut with_hash = values.filter(|have| id.hash != 0 && have.hash == id.hash);
+            match (with_hash.next(), with_hash.next()) {
+                (Some(only), None) => Some(only),
+                _ => None,
             }
-            None => None,
-        };
-        found.map(|(stage, handle, _)| (stage, handle))
+        })
+    }
+
+    /// The values of both stages, with their ids.
+    fn values(&self) -> impl Iterator<Item = (Stage, Handle<Expression>, &ValueId)> {
+        [Stage::Vertex, Stage::Fragment]
+            .into_iter()
+            .filter_map(|stage| Some((stage, self.index(stage)?)))
+            .flat_map(|(stage, entry)| {
+                let values = self.module.entry_points[entry].function.expressions.iter();
+                let ids = self.ids[entry].iter();
+                ids.zip(values)
+                    .map(move |(have, (value, _))| (stage, value, have))
+            })
     }
 
     /// Checks the module with naga's validator, every capability allowed.

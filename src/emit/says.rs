@@ -1,6 +1,6 @@
 //! Words a recipe for people: what changed, in one short sentence.
 
-use lodc_passes::{Candidate, Recipe};
+use lodc_passes::{Candidate, Recipe, ValueId};
 
 /// How many names a list has before it becomes a number.
 const NAMED: usize = 3;
@@ -43,7 +43,10 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     for candidate in candidates {
         let site = short(candidate.site.path());
         match candidate.choice.split_once(' ') {
-            Some(("keep", operand)) => kept.push(format!("{site} keeps {}", short(operand))),
+            Some(("keep", operand)) => {
+                let operand = ValueId::from(operand);
+                kept.push(format!("{site} keeps {}", short(operand.path())));
+            }
             None if candidate.choice == "without" => without.push(site),
             None if candidate.choice.rsplit('-').next() == Some("mean") => means.push(site),
             _ => others.push(format!("{site}: {}", candidate.choice)),
@@ -99,7 +102,11 @@ mod tests {
     fn groups_by_pass_and_drops_the_function() {
         let recipe = Recipe(vec![
             candidate("texture-removal", "main.normal_map", "seen-mean"),
-            candidate("op-removal", "main.specular.mul", "keep main.specular.pow"),
+            candidate(
+                "op-removal",
+                "main.specular.mul",
+                "keep main.specular.pow#0123456789abcdef",
+            ),
             candidate("texture-removal", "main.albedo", "texture-mean"),
             candidate("op-removal", "main.ambient", "without"),
         ]);

@@ -1254,6 +1254,8 @@ impl Forward<'_> {
         if let Known::Value(before) = self.state[local.index()]
             && self.same(before, value)
         {
+            // A loop without this store may be one that leaves the variable alone.
+            self.again = true;
             return;
         }
         let pointer = self.pointer(local);

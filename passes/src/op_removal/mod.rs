@@ -5,7 +5,7 @@
 //! own type; to take a side, it is the condition of an `if`; for a mean, the site is such an operation, a merged local variable, a vector made of
 //! parts, or an input, and the samples saw it.
 //!
-//! Effect. `keep <operand>`: the site's users use that operand. `mean`: they use the value's mean over
+//! Effect. `keep <operand's id>`: the site's users use that operand. `mean`: they use the value's mean over
 //! the samples, a constant that the candidate carries. `without`: every operation that uses the site
 //! keeps its other operand, as if the site were the zero of a sum, the one of a product, or the side of
 //! a mix that is not chosen; so a costly value that several operations share dies at once, where each
@@ -43,7 +43,7 @@ use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
 use crate::operands::{self, User};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
-use crate::shader::{Shader, Stage};
+use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, constants};
 use naga::{
     BinaryOperator as Op, Binding, Block, Expression, Literal, MathFunction as Math, Statement,
@@ -57,9 +57,9 @@ const STAGES: [Stage; 1] = [Stage::Fragment];
 pub struct OpRemoval;
 
 /// What is done at a site: the only place where the words of this pass are read.
-enum Choice<'a> {
-    /// The users use an operand, named by its path.
-    Keep(&'a str),
+enum Choice {
+    /// The users use an operand.
+    Keep(ValueId),
     /// The users use the baked mean.
     Mean,
     /// The users do without it.
@@ -68,10 +68,10 @@ enum Choice<'a> {
     Take(bool),
 }
 
-impl<'a> Choice<'a> {
-    fn parse(choice: &'a str) -> Result<Self, Declined> {
+impl Choice {
+    fn parse(choice: &str) -> Result<Self, Declined> {
         match choice.split_once(' ') {
-            Some(("keep", path)) => Ok(Self::Keep(path)),
+            Some(("keep", id)) => Ok(Self::Keep(id.into())),
             None if choice == "mean" => Ok(Self::Mean),
             None if choice == "without" => Ok(Self::Without),
             None if choice == "accept" => Ok(Self::Take(true)),
@@ -151,17 +151,15 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<Change>), 
         .flatten()
         .ok_or_else(|| Declined("only operations of the fragment stage are removed".into()))?;
     let changes = match choice {
-        Choice::Keep(path) => {
+        Choice::Keep(id) => {
             may_change(&flow, site)?;
-            let kept = own_operands(&flow, site)
-                .into_iter()
-                .find(|operand| flow.id(*operand).path() == path)
-                .ok_or_else(|| {
-                    let site = candidate.site.path();
-                    Declined(format!(
-                        "`{path}` is no operand of `{site}` that has its type"
-                    ))
-                })?;
+            let own = own_operands(&flow, site);
+            let kept = named(&flow, &own, &id).ok_or_else(|| {
+                let (id, site) = (id.path(), candidate.site.path());
+                Declined(format!(
+                    "`{id}` is no operand of `{site}` that has its type"
+                ))
+            })?;
             if flow.is_constant(kept) {
                 return Err(Declined(
                     "a constant is not kept: the mean is a better one".into(),
@@ -221,6 +219,19 @@ fn own_operands(flow: &Flow, site: Value) -> Vec<Value> {
         });
     }
     own
+}
+
+/// The value among a few that an id means: the one of its path, or the only one of its hash.
+fn named(flow: &Flow, values: &[Value], id: &ValueId) -> Option<Value> {
+    let mut values = values.iter().copied();
+    let by_path = values
+        .clone()
+        .find(|value| flow.id(*value).path() == id.path());
+    by_path.or_else(|| {
+        let has_hash = |value: &Value| id.hash() != 0 && flow.id(*value).hash() == id.hash();
+        let found = values.find(has_hash)?;
+        values.all(|value| !has_hash(&value)).then_some(found)
+    })
 }
 
 /// How many components the mean of a value would have; `None` when it can have none.

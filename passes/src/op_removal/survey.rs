@@ -106,7 +106,7 @@ impl<'a> Survey<'a> {
             }
             for kept in own_operands(self.flow, site) {
                 if !self.flow.is_constant(kept) {
-                    let choice = format!("keep {}", self.flow.id(kept).path());
+                    let choice = format!("keep {}", self.flow.id(kept));
                     let verdict = self.keep(site, kept).map(|()| Vec::new());
                     found.push(self.considered(site, choice, verdict));
                 }

@@ -1,4 +1,5 @@
 // What the loop adds up has a mean as a whole.
+// expect: 9 candidates
 @group(0) @binding(0) var<uniform> weights: array<vec4f, 4>;
 
 @fragment

@@ -1,4 +1,5 @@
 // Both uses of the read's parts have something else to keep, so it goes at once.
+// expect: 10 candidates
 @group(0) @binding(0) var dirt: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 

@@ -1,4 +1,5 @@
 // Either side of a sum or product may go.
+// expect: 8 candidates
 @group(0) @binding(0) var<uniform> shine: f32;
 
 @fragment

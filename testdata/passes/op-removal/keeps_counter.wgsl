@@ -1,4 +1,5 @@
 // The counter's test has two sides, but only one end.
+// expect: 2 candidates
 @group(0) @binding(0) var<uniform> weights: array<vec4f, 4>;
 
 @fragment

@@ -1,4 +1,5 @@
 // A changed depth would change what is hidden, here and in other draws.
+// expect: 1 candidates
 struct Output {
     @location(0) colour: vec4f,
     @builtin(frag_depth) depth: f32,

@@ -1,4 +1,5 @@
 // The loop ends when a float says so: every value that leads to it stays.
+// expect: 1 candidates
 @group(0) @binding(0) var<uniform> step_size: f32;
 
 @fragment

@@ -1,4 +1,5 @@
 // An override is the host's to set: what is made of overrides alone is not averaged.
+// expect: 0 candidates
 override gain: f32 = 2.0;
 
 @fragment

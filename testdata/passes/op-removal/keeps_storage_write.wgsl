@@ -1,4 +1,5 @@
 // What is written to memory, and whether it is, is nobody's picture.
+// expect: 0 candidates
 @group(0) @binding(0) var<storage, read_write> log: array<f32, 4>;
 
 @fragment

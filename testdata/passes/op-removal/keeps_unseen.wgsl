@@ -1,4 +1,5 @@
 // No sample computed the square, so it has no mean.
+// expect: 1 candidates
 // facts: fs_main.squared unseen
 // facts: fs_main.level unseen
 

@@ -1,4 +1,5 @@
 // A read in a branch leaves the branch in place.
+// expect: 2 candidates
 @group(0) @binding(0) var sky: texture_cube<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 

@@ -1,4 +1,5 @@
 // One colour everywhere: the constant is exact.
+// expect: 2 candidates
 // facts: texture white flat
 @group(0) @binding(0) var white: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;

@@ -1,4 +1,5 @@
 // Four texels of one channel: only what was seen stands for them.
+// expect: 3 candidates
 @group(0) @binding(0) var heights: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 

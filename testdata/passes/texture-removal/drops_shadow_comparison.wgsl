@@ -1,4 +1,5 @@
 // How much light came through has a mean over the samples; the depths' mean means nothing.
+// expect: 3 candidates
 @group(0) @binding(0) var shadow_map: texture_depth_2d;
 @group(0) @binding(1) var shadow_sampler: sampler_comparison;
 

@@ -1,4 +1,5 @@
 // A lookup table that is read by texel goes like any texture; its size is still asked for.
+// expect: 2 candidates
 @group(0) @binding(0) var ramp: texture_1d<f32>;
 
 @fragment

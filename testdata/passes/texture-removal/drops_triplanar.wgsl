@@ -1,4 +1,5 @@
 // Each read may go, and all three at once, which frees the texture.
+// expect: 8 candidates
 // facts: fs_main.side mean 0.25 0.25 0.25 1.0
 @group(0) @binding(0) var rock: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;

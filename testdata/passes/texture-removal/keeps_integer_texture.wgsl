@@ -1,4 +1,5 @@
 // The number of a material has no mean.
+// expect: 0 candidates
 @group(0) @binding(0) var materials: texture_2d<u32>;
 
 @fragment

@@ -1,4 +1,5 @@
 // The height decides when the march ends.
+// expect: 0 candidates
 @group(0) @binding(0) var heights: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 

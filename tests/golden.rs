@@ -1,0 +1,208 @@
+//! Golden files: what each pass makes of each of its fixtures, as full-context diffs.
+//!
+//! Beside `testdata/passes/<pass>/<case>.wgsl` lies `<case>.diff`: for every candidate in order, the
+//! fragment stage before and after, as it would be emitted; for what the pass declines, the reason.
+//! A fixture may open with comments that are read here:
+//!
+//! ```text
+//! // expect: 3 candidates
+//! // facts: fs_main.size min 0.5 max 0.9 mean 0.7      one number for all components, or one for each
+//! // facts: fs_main.rare unseen                          or count 16: by fewer samples than others
+//! // facts: texture albedo dynamic                      or flat: one colour everywhere
+//! ```
+//!
+//! The facts are those of [`synthetic`] otherwise. `BLESS=1 cargo test --test golden` writes the golden
+//! files anew; the `expect` line is for hands only, so that blessing carelessly fails.
+
+mod synthetic;
+
+use lodc::emit::{self, EmitLevel, Form, Output};
+use lodc::front::Source;
+use lodc_passes::facts::{Facts, ValueFacts};
+use lodc_passes::{PASSES, Pass, Shader, ValueId};
+use similar::{ChangeTag, TextDiff};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+#[test]
+fn passes_do_to_their_fixtures_what_the_goldens_say() {
+    let bless = std::env::var_os("BLESS").is_some();
+    let mut wrong = Vec::new();
+    for pass in PASSES {
+        for path in fixtures(pass.name()) {
+            let (golden, offered) = golden(*pass, &path);
+            let name = format!(
+                "{}/{}",
+                pass.name(),
+                path.file_stem().unwrap_or_default().display()
+            );
+            let text = fs::read_to_string(&path).expect("the fixture can be read");
+            let expected = text
+                .lines()
+                .find_map(|line| line.strip_prefix("// expect: "));
+            let found = format!("{offered} candidates");
+            if expected != Some(&found) {
+                let expected = expected.unwrap_or("nothing");
+                wrong.push(format!("{name} expects {expected}, but offers {found}\n"));
+            }
+            let file = path.with_extension("diff");
+            let before = fs::read_to_string(&file).unwrap_or_default();
+            if bless {
+                fs::write(&file, &golden).expect("the golden can be written");
+            } else if before != golden {
+                let diff = TextDiff::from_lines(&before, &golden);
+                wrong.push(format!("{name}\n{}", diff.unified_diff()));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{}\nto accept the new goldens: BLESS=1 cargo test --test golden",
+        wrong.join("\n")
+    );
+}
+
+fn fixtures(pass: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("testdata/passes")
+        .join(pass);
+    let entries = fs::read_dir(&folder).expect("every pass has fixtures");
+    let mut found: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("the folder can be read").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
+        .collect();
+    found.sort();
+    found
+}
+
+/// The golden text of a fixture, and how many candidates it has.
+fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
+    let fail = |e: &dyn std::fmt::Display| -> ! { panic!("{}: {e}", path.display()) };
+    let text = fs::read_to_string(path).expect("the fixture can be read");
+    // Without its comments, so that those are not in every diff.
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
+    let shader = lodc_passes::normalize(
+        &source.module,
+        source.vertex.as_deref(),
+        &source.fragment,
+        100_000,
+    )
+    .unwrap_or_else(|e| fail(&e));
+    let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
+    let before = fragment_stage(&source, &shader);
+    let mut golden = String::new();
+    let mut offered = 0;
+    for considered in pass.consider(&shader, &facts) {
+        let candidate = considered.candidate;
+        if let Some(declined) = considered.declined {
+            let _ = writeln!(golden, "# {candidate}: declined, {declined}\n");
+            continue;
+        }
+        offered += 1;
+        let _ = writeln!(golden, "# {candidate}");
+        assert_eq!(
+            pass.applies(&shader, &candidate),
+            Ok(()),
+            "{name}: {candidate}"
+        );
+        let after = fragment_stage(&source, &pass.apply(&shader, &candidate));
+        assert_ne!(before, after, "{name}: {candidate} changes nothing");
+        for change in TextDiff::from_lines(&before, &after).iter_all_changes() {
+            let sign = match change.tag() {
+                ChangeTag::Equal => ' ',
+                ChangeTag::Delete => '-',
+                ChangeTag::Insert => '+',
+            };
+            golden.push_str(format!("{sign} {}", change.value()).trim_end());
+            golden.push('\n');
+        }
+        golden.push('\n');
+    }
+    if golden.is_empty() {
+        golden.push_str("# nothing to consider\n");
+    }
+    (golden.trim_end().to_owned() + "\n", offered)
+}
+
+/// The text of a variant's fragment stage, as emitted.
+fn fragment_stage(source: &Source, shader: &Shader) -> String {
+    let level = EmitLevel {
+        autolod: 1.0,
+        shader: shader.clone(),
+        distance: 1.0,
+        error: 0.0,
+        cost: 1.0,
+        says: "a variant".into(),
+    };
+    let output = Output {
+        form: Form::Files,
+        ..Output::default()
+    };
+    let files =
+        emit::emit(source, &[level], output).unwrap_or_else(|e| panic!("{}: {e}", source.name));
+    let (_, bytes) = files.last().expect("one file a level");
+    let text = String::from_utf8(bytes.clone()).expect("WGSL is text");
+    let start = text.find("@fragment").expect("there is a fragment stage");
+    text[start..].to_owned()
+}
+
+/// The synthetic facts, changed as the fixture's comments say; the line that cannot be read otherwise.
+fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
+    let mut facts = synthetic::facts(shader);
+    for line in text.lines() {
+        let Some(fact) = line.strip_prefix("// facts: ") else {
+            continue;
+        };
+        let words: Vec<&str> = fact.split_whitespace().collect();
+        let read = match words[..] {
+            ["texture", name, "dynamic"] => facts.textures.remove(name).map(drop),
+            ["texture", name, "flat"] => facts.textures.get_mut(name).map(|texture| {
+                for deviation in &mut texture.deviation {
+                    *deviation = [0.0; 4];
+                }
+            }),
+            [path, "unseen"] => facts.values.remove(&id(shader, path)).map(drop),
+            [path, ..] => facts
+                .values
+                .get_mut(&id(shader, path))
+                .and_then(|value| figures(value, &words[1..])),
+            [] => None,
+        };
+        read.ok_or_else(|| line.to_owned())?;
+    }
+    Ok(facts)
+}
+
+fn id(shader: &Shader, path: &str) -> ValueId {
+    match shader.find(&path.into()) {
+        Some((stage, value)) => shader.id(stage, value).clone(),
+        None => path.into(),
+    }
+}
+
+/// Reads `min 0.5 max 0.9 mean 0.6 0.7 0.8 count 16`.
+fn figures(value: &mut ValueFacts, mut words: &[&str]) -> Option<()> {
+    while let [word, rest @ ..] = words {
+        if let ("count", [count, rest @ ..]) = (*word, rest) {
+            value.count = count.parse().ok()?;
+            words = rest;
+            continue;
+        }
+        let figure = match *word {
+            "mean" => &mut value.mean,
+            "min" => &mut value.min,
+            "max" => &mut value.max,
+            _ => return None,
+        };
+        let numbers: Vec<f32> = rest.iter().map_while(|word| word.parse().ok()).collect();
+        words = &rest[numbers.len()..];
+        match numbers[..] {
+            [number] => figure.fill(number),
+            _ if numbers.len() == figure.len() => figure.copy_from_slice(&numbers),
+            _ => return None,
+        }
+    }
+    Some(())
+}
