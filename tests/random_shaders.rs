@@ -176,7 +176,7 @@ impl Writer {
                     2 => format!("fract({a} * {f})"),
                     3 => format!("({a}).yx"),
                     4 => format!("min({a}, {b})"),
-                    _ => format!("node.at"),
+                    _ => "node.at".to_owned(),
                 }
             }
         }
