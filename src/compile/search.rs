@@ -41,8 +41,11 @@ impl Ready {
             .scene
             .clone()
             .or_else(|| beside.is_file().then_some(beside));
-        let scene = Scene::read(&source, scene_file.as_deref())?;
+        // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
+        let fragment = base.index(Stage::Fragment).unwrap_or(0);
+        Program::compile(base.module(), fragment, &[]).map_err(|what| refused(&source, &what))?;
+        let scene = Scene::read(&source, scene_file.as_deref())?;
         Ok(Self {
             source,
             scene,
@@ -57,21 +60,15 @@ impl Ready {
             (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
             (None, index) => Program::compile(self.base.module(), index.unwrap_or(0), &[]),
         };
-        compiled.map_err(|refused| self.refused(&refused))
+        compiled.map_err(|what| refused(&self.source, &what))
     }
+}
 
-    /// What the evaluator refuses, at its place.
-    fn refused(&self, refused: &Refused) -> Box<Diagnostic> {
-        let error = Diagnostic::error(format!("lodc cannot evaluate {}", refused.what))
-            .with_source(&self.source.name, &self.source.text)
-            .with_note(
-                "errors are measured by running the shader on the CPU, which does not do this",
-            );
-        match refused.span.to_range() {
-            Some(range) => error.with_label(range, "here"),
-            None => error,
-        }
-    }
+/// What the evaluator refuses, at its place.
+fn refused(source: &Source, refused: &Refused) -> Box<Diagnostic> {
+    let error = Diagnostic::error(format!("lodc cannot evaluate {}", refused.what))
+        .with_note("errors are measured by running the shader on the CPU, which does not do this");
+    source.locate(error, refused.span, "here")
 }
 
 /// Compiles a material shader: searches its levels, and makes the files that hold them.
@@ -81,12 +78,19 @@ impl Ready {
 pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Result<Compiled> {
     let ready = Ready::read(request)?;
     let vertex = ready.vertex()?;
+    let inputs: Vec<PathBuf> = ready.inputs(request).collect();
+    // What cannot be written should be known before a search that takes a minute.
+    let trial = emit::emit(&ready.source, &[], request.emit)?;
+    let trial = request.placed(&ready.source, trial);
+    request.spare(&trial, &inputs)?;
+    emit::writable(&trial)?;
+
     let stand = Stand {
         base: &ready.base,
         vertex: &vertex,
         scene: &ready.scene,
     };
-    let found = search::find(&stand, progress).map_err(|refused| ready.refused(&refused))?;
+    let found = search::find(&stand, progress).map_err(|what| refused(&ready.source, &what))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     let levels: Vec<EmitLevel> = found
         .levels
@@ -113,7 +117,6 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         ready.origin(request),
     );
     files.push((request.beside("lod.json"), report.json().into_bytes()));
-    let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     request.spare(&files, &inputs)?;
     Ok(Compiled {
         files,
@@ -297,7 +300,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let distances = &ready.scene.distances;
     let distance = distances[distances.len() / 2];
     let set = SampleSet::new(&stand, distance, Samples::Search)
-        .map_err(|refused| ready.refused(&refused))?;
+        .map_err(|what| refused(&ready.source, &what))?;
     let facts = set.facts(&ready.base);
     let candidates: Vec<Candidate> = PASSES
         .iter()

@@ -188,6 +188,11 @@ impl Lock {
     /// # Errors
     /// When the file cannot be read, and as [`Lock::parse`].
     pub fn read(path: &Path) -> Result<(Self, String)> {
+        if !path.exists() {
+            let path = path.display();
+            return Err(Diagnostic::error(format!("there is no lock `{path}`"))
+                .with_note("make it first: run lodc without `--locked`"));
+        }
         let text = read_text(path, "lock")?;
         Ok((Self::parse(&path.display().to_string(), &text)?, text))
     }

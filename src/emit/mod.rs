@@ -27,7 +27,7 @@ mod tests;
 
 pub use lock::{FORMAT, Lock, LockedFile, LockedLevel, LockedSource, LockedTexture, figure, hash};
 pub use says::says;
-pub use write::write_atomically;
+pub use write::{writable, write_atomically};
 
 use crate::front::{Source, Stages};
 use crate::{Diagnostic, Result};

@@ -12,14 +12,9 @@ use std::path::{Path, PathBuf};
 /// At the first file that cannot be written, with its path and the reason; then nothing has changed, unless it
 /// is a rename that failed, and even then every file is whole.
 pub fn write_atomically(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+    writable(files)?;
     let mut written = Written(Vec::new());
     for (path, bytes) in files {
-        if path.is_dir() {
-            return Err(
-                Diagnostic::error(format!("`{}` is a folder", path.display()))
-                    .with_note("give the name of a file to write"),
-            );
-        }
         make_folder(path)?;
         let beside = beside(path);
         written.0.push(beside.clone());
@@ -43,22 +38,37 @@ impl Drop for Written {
     }
 }
 
-fn make_folder(path: &Path) -> Result<()> {
-    let Some(folder) = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    else {
-        return Ok(());
-    };
-    if let Some(file) = folder.ancestors().find(|above| above.is_file()) {
-        return Err(Diagnostic::error(format!(
-            "cannot write `{}`: `{}` is a file, not a folder",
-            path.display(),
-            file.display()
-        ))
-        .with_note("choose another place with -o"));
+/// Whether files can have their places, as far as can be known without writing.
+///
+/// # Errors
+/// When one is a folder, or below a file.
+pub fn writable(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+    for (path, _) in files {
+        if path.is_dir() {
+            return Err(
+                Diagnostic::error(format!("`{}` is a folder", path.display()))
+                    .with_note("give the name of a file to write"),
+            );
+        }
+        if let Some(file) = path.ancestors().skip(1).find(|above| above.is_file()) {
+            return Err(Diagnostic::error(format!(
+                "cannot write `{}`: `{}` is a file, not a folder",
+                path.display(),
+                file.display()
+            ))
+            .with_note("choose another place with `-o`"));
+        }
     }
-    fs::create_dir_all(folder).map_err(|e| failed(path, &e))
+    Ok(())
+}
+
+fn make_folder(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            fs::create_dir_all(folder).map_err(|e| failed(path, &e))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The name under which a file is written first. The process is in it, so that two runs do not meet.
