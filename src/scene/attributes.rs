@@ -248,6 +248,7 @@ fn unknown_inputs(source: &Source, toml: Toml, unknown: &[&Input]) -> Box<Diagno
 #[cfg(test)]
 mod tests {
     use super::super::file::SceneFile;
+    use super::super::objects::Object;
     use super::*;
 
     const TEXT: &str = "
@@ -265,7 +266,7 @@ mod tests {
             text: toml,
         };
         let file: SceneFile = toml.parse().unwrap();
-        let settings = Settings::read(toml, &file).unwrap();
+        let settings = Settings::read(toml, &file, Object::Sphere).unwrap();
         let mut inferences = Vec::new();
         let fed = resolve(&source, toml, &file.attributes, &settings, &mut inferences);
         (fed, inferences)

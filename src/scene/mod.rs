@@ -25,7 +25,7 @@ pub use textures::SceneTexture;
 
 use crate::eval::machine::{Bindings, Resource};
 use crate::eval::raster::{Attribute, Frame};
-use crate::front::{Source, VertexStage, read_text};
+use crate::front::{Source, VertexStage, inputs, read_text};
 use crate::{Diagnostic, Result};
 use buffers::{Buffer, Said};
 use camera::{Pose, Sphere};
@@ -33,7 +33,7 @@ use file::Toml;
 use glam::{DMat4, DVec3};
 use lodc_passes::autolod;
 use mesh::Mesh;
-use naga::Span;
+use naga::{Binding, Span};
 use objects::Object;
 use settings::Settings;
 use std::collections::BTreeMap;
@@ -188,7 +188,7 @@ impl Scene {
         let text = file.map_or("", |(_, text)| text);
         let toml = Toml { name: &name, text };
         let file_values = toml.parse()?;
-        let settings = Settings::read(toml, &file_values)?;
+        let settings = Settings::read(toml, &file_values, default_object(source))?;
         let mut said = Said::default();
         let mut buffers = buffers::resolve(
             source,
@@ -379,6 +379,20 @@ impl Scene {
     }
 }
 
+/// What is drawn when the scene names no object: a sphere, or, for a vertex stage that takes nothing from a
+/// mesh, what it makes of the indices of six vertices.
+fn default_object(source: &Source) -> Object {
+    let reads = |entry: usize| {
+        let inputs = inputs(&source.module, entry, &source.text);
+        let mut bindings = inputs.into_iter().map(|input| input.binding);
+        bindings.any(|binding| matches!(binding, Binding::Location { .. }))
+    };
+    match source.vertex_entry() {
+        Some((entry, _)) if !reads(entry) => Object::Screen,
+        _ => Object::Sphere,
+    }
+}
+
 /// The hash of an input file.
 fn hash(bytes: &[u8]) -> String {
     format!("blake3:{}", blake3::hash(bytes).to_hex())
@@ -548,6 +562,19 @@ mod tests {
             text.contains("[uniforms]\n    \"tint\" = [0.0, 0.0, 0.0, 0.0]"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_vertex_stage_without_attributes_gets_bare_vertices() {
+        let shader = "@vertex fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+                return vec4f(vec2f(f32(i / 2), f32(i % 2)) * 4.0 - 1.0, 0.0, 1.0);
+            }
+            @fragment fn fs() -> @location(0) vec4f { return vec4f(); }";
+        let bare = scene(shader, "").unwrap();
+        assert_eq!((bare.object, bare.mesh.indices.len()), (Object::Screen, 6));
+        assert_eq!(bare.frames(5.0, Samples::Full).len(), 1);
+        let named = scene(shader, "object = \"cube\"").unwrap();
+        assert_eq!(named.object, Object::Cube);
     }
 
     #[test]

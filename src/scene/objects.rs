@@ -21,10 +21,13 @@ pub enum Object {
     TorusKnot,
     /// Hills over -1..1 in x and z, y up; heights come from the seed.
     Terrain,
+    /// Two triangles that have nothing but their vertices' indices, for a vertex stage that reads no more:
+    /// one that covers the screen. Scenes cannot name it; it stands in where they name no object.
+    Screen,
 }
 
 impl Object {
-    /// All of them, with the names that scenes use.
+    /// All that scenes can name, with their names.
     pub const ALL: [(&'static str, Self); 5] = [
         ("sphere", Self::Sphere),
         ("plane", Self::Plane),
@@ -37,7 +40,7 @@ impl Object {
     pub fn name(self) -> &'static str {
         let mut all = Self::ALL.into_iter();
         all.find(|(_, object)| *object == self)
-            .map_or("", |(name, _)| name)
+            .map_or("screen", |(name, _)| name)
     }
 
     /// Its triangles. `seed` decides the hills of the terrain and nothing else.
@@ -51,6 +54,11 @@ impl Object {
             Self::Cube => cube(18),
             Self::TorusKnot => torus_knot(192, 12),
             Self::Terrain => terrain(48, seed),
+            Self::Screen => Mesh {
+                positions: vec![[0.0; 3]; 6],
+                indices: (0..6).collect(),
+                ..Mesh::default()
+            },
         }
     }
 
@@ -60,6 +68,7 @@ impl Object {
         match self {
             Self::Plane => (DVec3::Z, 70f64.to_radians()),
             Self::Terrain => (DVec3::Y, 75f64.to_radians()),
+            Self::Screen => (DVec3::Z, 0.0),
             Self::Sphere | Self::Cube | Self::TorusKnot => (DVec3::Z, PI),
         }
     }
@@ -451,5 +460,6 @@ mod tests {
     #[test]
     fn an_empty_mesh_has_a_sphere_too() {
         assert_eq!(bounding_sphere(&Mesh::default()).radius, 1.0);
+        assert_eq!(bounding_sphere(&Object::Screen.mesh(1)).radius, 1.0);
     }
 }

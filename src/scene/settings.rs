@@ -72,8 +72,8 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// Checks what the file says, and fills in what it leaves out.
-    pub(super) fn read(toml: Toml, file: &SceneFile) -> Result<Self> {
+    /// Checks what the file says, and fills in what it leaves out: of objects, `other`.
+    pub(super) fn read(toml: Toml, file: &SceneFile, other: Object) -> Result<Self> {
         let number = |what: &str,
                       value: &Option<Spanned<f64>>,
                       other: f64,
@@ -97,7 +97,7 @@ impl Settings {
                 )),
             };
         let object = match &file.object {
-            None => Object::Sphere,
+            None => other,
             Some(name) => find_object(toml, name)?,
         };
         let seed = whole("seed", &file.seed, 1, 0, i64::MAX)?.cast_unsigned();
@@ -358,6 +358,8 @@ fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<Vec<DVec3>
             .collect();
     }
     let count = match &views.count {
+        // Every direction shows the same.
+        None if object == Object::Screen => 1,
         None => 6,
         Some(count) => {
             let found = usize::try_from(*count.get_ref()).ok();
@@ -385,7 +387,7 @@ mod tests {
             name: "a.toml",
             text,
         };
-        Settings::read(toml, &toml.parse()?)
+        Settings::read(toml, &toml.parse()?, Object::Sphere)
     }
 
     #[test]
