@@ -101,19 +101,6 @@ pub struct InputFile {
     pub hash: String,
 }
 
-/// Which samples of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Samples {
-    /// A few, to search with: half of the views, two at least and [`SEARCH_VIEWS`] at most, each with one
-    /// sample of the uniforms.
-    Search,
-    /// All of them: every view with every sample of the uniforms.
-    Full,
-}
-
-/// The most views that a search looks at.
-pub const SEARCH_VIEWS: usize = 3;
-
 /// Something that was left out of the scene, and told from a name and a type.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Inference {
@@ -294,24 +281,10 @@ impl Scene {
     /// The pictures at a distance from the eye to the sphere's centre, in a fixed order: for each view, for each
     /// sample of the uniforms. They are drawn at pixel centres, one sample a pixel; the caller may change
     /// `offset` and `grid`.
-    pub fn frames(&self, distance: f64, set: Samples) -> Vec<Frame> {
-        let views = self.views.len();
-        let chosen: Vec<(usize, usize)> = match set {
-            Samples::Full => (0..views)
-                .flat_map(|view| (0..self.samples).map(move |sample| (view, sample)))
-                .collect(),
-            Samples::Search => {
-                let count = views.div_ceil(2).clamp(views.min(2), SEARCH_VIEWS);
-                let spaced = (0..count).map(|i| i * views / count);
-                spaced
-                    .enumerate()
-                    .map(|(i, view)| (view, i % self.samples))
-                    .collect()
-            }
-        };
-        chosen
-            .into_iter()
-            .map(|(view, sample)| self.frame(self.views[view], distance, sample))
+    pub fn frames(&self, distance: f64) -> Vec<Frame> {
+        self.views
+            .iter()
+            .flat_map(|view| (0..self.samples).map(|sample| self.frame(*view, distance, sample)))
             .collect()
     }
 
@@ -442,11 +415,9 @@ mod tests {
         let scene = scene(TEXT, TOML).unwrap();
         // Time is sampled three times.
         assert_eq!(scene.uniform_samples(), 3);
-        let full = scene.frames(5.0, Samples::Full);
+        let full = scene.frames(5.0);
         assert_eq!(full.len(), 12);
-        let search = scene.frames(5.0, Samples::Search);
-        assert_eq!(search.len(), 2);
-        for frame in full.iter().chain(&search) {
+        for frame in &full {
             assert_eq!(frame.bindings.len(), 4);
             assert_eq!((frame.width, frame.height, frame.grid), (256, 256, 1));
             assert_eq!(
@@ -466,12 +437,6 @@ mod tests {
         assert_eq!(a[..76], b[..76]);
         assert_ne!(a[76..], b[76..]);
         assert_ne!(a[..64], c[..64]);
-        // Each frame of the search is one of all.
-        assert!(
-            search
-                .iter()
-                .all(|s| full.iter().any(|f| bytes(f, (0, 0)) == bytes(s, (0, 0))))
-        );
     }
 
     #[test]
@@ -520,10 +485,7 @@ mod tests {
         );
         let said = scene(TEXT, &toml).unwrap();
         assert!(said.inferences.is_empty());
-        let (a, b) = (
-            told.frames(7.0, Samples::Full),
-            said.frames(7.0, Samples::Full),
-        );
+        let (a, b) = (told.frames(7.0), said.frames(7.0));
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(bytes(a, (0, 0)), bytes(b, (0, 0)));
             assert_eq!(a.attributes, b.attributes);
@@ -535,7 +497,7 @@ mod tests {
         let shader = "@group(1) @binding(4) var<uniform> tint: vec4f;
             @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f { return tint * vec4f(uv, uv); }";
         let scene = scene(shader, "[uniforms]\ntint = [1, 1, 1, 1]").unwrap();
-        let frames = scene.frames(5.0, Samples::Full);
+        let frames = scene.frames(5.0);
         assert_eq!(frames.len(), 6);
         assert_eq!(
             frames[0].bindings.keys().collect::<Vec<_>>(),
@@ -572,7 +534,7 @@ mod tests {
             @fragment fn fs() -> @location(0) vec4f { return vec4f(); }";
         let bare = scene(shader, "").unwrap();
         assert_eq!((bare.object, bare.mesh.indices.len()), (Object::Screen, 6));
-        assert_eq!(bare.frames(5.0, Samples::Full).len(), 1);
+        assert_eq!(bare.frames(5.0).len(), 1);
         let named = scene(shader, "object = \"cube\"").unwrap();
         assert_eq!(named.object, Object::Cube);
     }

@@ -7,7 +7,7 @@ use crate::eval::machine::Bindings;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::{Coverage, rasterize};
 use crate::eval::texture::Dimension;
-use crate::scene::{self, Output, Scene, SceneTexture};
+use crate::scene::{Output, Scene, SceneTexture};
 use glam::{Vec2, Vec3};
 use lodc_passes::facts::{TextureFacts, ValueFacts};
 use lodc_passes::{Facts, Shader, Stage, Work, autolod};
@@ -75,7 +75,7 @@ impl<'a> SampleSet<'a> {
     /// When the evaluator refuses the original.
     pub fn new(stand: &'a Stand<'a>, distance: f64, samples: Samples) -> Result<Self, Refused> {
         let original = compile(stand.base, &[])?;
-        let frames = stand.scene.frames(distance, scene::Samples::Full);
+        let frames = stand.scene.frames(distance);
         let squares = match samples {
             Samples::Full => usize::MAX,
             Samples::Search => (SEARCH_SQUARES / frames.len().max(1)).max(64),
