@@ -344,6 +344,15 @@ mod tests {
     }
 
     #[test]
+    fn a_text_without_end_is_not_read() {
+        let error = refused(&"// ".repeat(2 << 20));
+        assert_eq!(
+            error.message,
+            "`a.wgsl` has 6291456 bytes, more than the 4194304 that lodc reads"
+        );
+    }
+
+    #[test]
     fn relatives_of_wgsl_are_named() {
         for (text, message, place) in [
             (
@@ -413,7 +422,23 @@ mod tests {
 
     #[test]
     fn deep_nesting_is_an_error_or_fine_and_never_a_crash() {
-        let n = 50_000;
+        // The deepest that is read is read; one more is refused at its place.
+        let nested = |n: usize| {
+            format!(
+                "fn f(a: bool) {{ {} {} }}",
+                "if a {".repeat(n),
+                "}".repeat(n)
+            )
+        };
+        assert!(parse("a.wgsl", &nested(100)).is_ok());
+        let chain = format!(
+            "fn f(a: bool) {{ {} {{}} }}",
+            "if a {} else ".repeat(DEEPEST + 2)
+        );
+        let error = refused(&chain);
+        assert_eq!(error.message, "statements are nested more than 256 deep");
+        assert!(!error.labels.is_empty());
+        let n = 20_000;
         for text in [
             format!(
                 "fn f() -> f32 {{ return {}1.0{}; }}",

@@ -551,6 +551,72 @@ mod tests {
     }
 
     #[test]
+    fn damaged_files_are_errors_or_scenes_and_never_a_crash() {
+        const PIECES: [&str; 24] = [
+            "",
+            "[",
+            "]",
+            "{",
+            "}",
+            "\"",
+            "=",
+            "0",
+            "1e39",
+            "nan",
+            "-1",
+            ".",
+            "f32",
+            "mat3x3f",
+            "f16",
+            "true",
+            "99999999999",
+            "\n",
+            "samples",
+            "from",
+            "dynamic",
+            "view",
+            "[3]",
+            "ü",
+        ];
+        let mut state = 1u64;
+        let mut random = move |below: usize| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) as usize % below
+        };
+        let mut damage = |text: &str| {
+            let mut text = text.to_owned();
+            let mut at = random(text.len());
+            let mut end = (at + random(8)).min(text.len());
+            while !text.is_char_boundary(at) {
+                at -= 1;
+            }
+            while !text.is_char_boundary(end) {
+                end += 1;
+            }
+            text.replace_range(at..end, PIECES[random(PIECES.len())]);
+            text
+        };
+        let mut scenes = 0;
+        for round in 0..600 {
+            let shader = if round % 3 == 0 {
+                damage(TEXT)
+            } else {
+                TEXT.to_owned()
+            };
+            match scene(&shader, &damage(TOML)) {
+                Ok(scene) => {
+                    scene.frames(5.0);
+                    scenes += 1;
+                }
+                Err(error) => assert!(!error.render(true).is_empty()),
+            }
+        }
+        assert!(scenes > 10, "{scenes}");
+    }
+
+    #[test]
     fn the_shaders_of_the_repository_resolve_without_a_warning() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata");
         for (folder, least) in [("materials", 6), ("shaders", 20)] {

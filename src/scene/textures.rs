@@ -946,6 +946,36 @@ mod tests {
     }
 
     #[test]
+    fn textures_without_image_files_are_dynamic_or_refused() {
+        let text = "@group(0) @binding(0) var many: texture_multisampled_2d<f32>;
+            @group(0) @binding(1) var line: texture_1d<f32>;
+            @fragment fn fs() -> @location(0) vec4f { return textureLoad(many, vec2i(0), 0) + textureLoad(line, 0, 0); }";
+        let folder = Folder::new("odd");
+        let source = Source::parse("a.wgsl", text).unwrap();
+        let place = Place {
+            folder: &folder.0,
+            seed: 1,
+        };
+        let images = |text: &str| {
+            let toml = Toml {
+                name: "a.toml",
+                text,
+            };
+            let file: SceneFile = toml.parse().unwrap();
+            resolve(&source, toml, &file.textures, &file.samplers, place)
+        };
+        assert!(images("[textures]\nmany = \"dynamic\"\nline = \"dynamic\"").is_ok());
+        let error = images("[textures]\nmany = \"a.png\"").unwrap_err();
+        assert_eq!(
+            error.message,
+            "`many` is a texture_multisampled_2d<f32>, which has no image file"
+        );
+        let error = images("[textures]\nmany = \"dynamic\"\nline = \"a.png\"").unwrap_err();
+        assert_eq!(error.message, "`line` is a texture_1d<f32>");
+        assert!(error.labels[0].1.contains("higher than one texel"));
+    }
+
+    #[test]
     fn a_misspelt_image_is_found() {
         let error = Folder::new("near")
             .resolve("[textures]\nalbedo = \"wid.png\"")

@@ -311,9 +311,13 @@ fn is_in(path: &str, place: &str) -> bool {
 /// Members that only fill room. Nobody has a value for them.
 fn is_padding(leaf: &Leaf) -> bool {
     let name = leaf.path.rsplit('.').next().unwrap_or_default();
-    words(name).first().is_some_and(|first| {
-        ["pad", "padding", "unused", "reserved", "dummy"].contains(&first.as_str())
-    })
+    let filler = ["pad", "padding", "unused", "reserved", "dummy"];
+    let words = words(name);
+    let digits = |word: &str| word.bytes().all(|b| b.is_ascii_digit());
+    let says = words.iter().any(|w| filler.contains(&w.as_str()));
+    says && words
+        .iter()
+        .all(|w| filler.contains(&w.as_str()) || digits(w))
 }
 
 /// A level of detail that the shader itself declares: lodc sets it, the original runs at 0.
@@ -697,6 +701,66 @@ mod tests {
         let buffers = resolve(&source, toml, &none, &none, &mut said).unwrap();
         assert!(said.missing.is_empty());
         assert_eq!(bytes(&buffers[0], 0), [0.0]);
+    }
+
+    #[test]
+    fn padding_is_told_by_its_whole_name() {
+        let padding = |path: &str| {
+            let width = 4;
+            let kind = ScalarKind::Float;
+            is_padding(&Leaf {
+                path: path.to_owned(),
+                offset: 0,
+                columns: 1,
+                rows: 1,
+                stride: 0,
+                kind,
+                width,
+            })
+        };
+        assert!(
+            ["s._pad", "s.padding_1", "s.unused0", "s.pad_padding"]
+                .into_iter()
+                .all(padding)
+        );
+        assert!(
+            !["s.pad_strength", "s.launchpad", "s.x1", "s._1"]
+                .into_iter()
+                .any(padding)
+        );
+    }
+
+    #[test]
+    fn what_the_evaluator_cannot_hold_is_refused() {
+        let refused = |declared: &str, toml: &str| {
+            let text = format!(
+                "enable f16; {declared}
+                @fragment fn fs() -> @location(0) vec4f {{ return vec4f(f32(b[0])); }}"
+            );
+            let source = Source::parse("a.wgsl", text).unwrap();
+            let toml = Toml {
+                name: "a.toml",
+                text: toml,
+            };
+            let file = toml.parse().unwrap();
+            let mut said = Said::default();
+            resolve(&source, toml, &file.uniforms, &file.storage, &mut said).unwrap_err()
+        };
+        let large = refused(
+            "@group(0) @binding(0) var<storage> b: array<f32, 2000000>;",
+            "",
+        );
+        assert_eq!(
+            large.message,
+            "the buffer `b` has 8000000 bytes, and at most 4194304 are evaluated"
+        );
+        let half = "@group(0) @binding(0) var<storage> b: array<f16, 2>;";
+        assert_eq!(
+            refused(half, "").message,
+            "`b[0]` is an f16, which the evaluator does not run"
+        );
+        let given = refused(half, "[storage]\n\"b[0]\" = 1.0");
+        assert!(given.notes[0].contains("32 bits"), "{given}");
     }
 
     #[test]

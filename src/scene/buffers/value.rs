@@ -349,6 +349,11 @@ impl Reader<'_> {
         let (Some(leaf), true) = (leaves.pop(), leaves.is_empty()) else {
             return Err(wrong("the scene cannot fill this type".to_owned()));
         };
+        if leaf.width != 4 {
+            return Err(wrong(
+                "the evaluator runs values of 32 bits only".to_owned(),
+            ));
+        }
         let mut numbers = Vec::new();
         let fits = match (leaf.columns, leaf.rows) {
             (1, 1) => scalar(value, &leaf, &mut numbers),
@@ -413,7 +418,7 @@ fn scalar(value: &Spanned<Node>, leaf: &Leaf, numbers: &mut Vec<f64>) -> bool {
         _ => None,
     };
     // A value that is no finite f32 would be written as something else.
-    let fits = number.filter(|x| (*x as f32).is_finite() && leaf.width == 4);
+    let fits = number.filter(|x| (*x as f32).is_finite());
     numbers.extend(fits);
     fits.is_some()
 }
