@@ -307,3 +307,43 @@ impl Survey<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facts::TextureFacts;
+    use crate::flow::tests::shader;
+
+    #[test]
+    fn the_error_of_a_mean_is_the_deviation_at_its_level() {
+        let shader = shader(
+            "@group(0) @binding(0) var grain: texture_2d<f32>;
+             @group(0) @binding(1) var s: sampler;
+             @fragment fn main(@location(0) uv: vec2f) -> @location(0) vec4f {
+                 let fine = textureSample(grain, s, uv); return fine;
+             }",
+        );
+        let mut facts = Facts::default();
+        let texture = TextureFacts {
+            mean: vec![[0.5; 4]; 2],
+            deviation: vec![[0.25; 4], [0.125; 4]],
+            level: 1.0,
+        };
+        facts.textures.insert("grain".into(), texture);
+        let offered = TextureRemoval.candidates(&shader, &facts);
+        let [mean] = &offered[..] else {
+            panic!("nothing was seen, so the texture's mean is all: {offered:?}");
+        };
+        assert_eq!(mean.choice, "texture-mean");
+        assert_eq!(deviation(&shader, &facts, mean), Some([0.125; 4]));
+        assert_eq!(TextureRemoval.class(mean), Class::Lossy);
+
+        if let Some(texture) = facts.textures.get_mut("grain") {
+            texture.deviation.fill([0.0; 4]);
+        }
+        let offered = TextureRemoval.candidates(&shader, &facts);
+        assert_eq!(offered[0].choice, "only-colour");
+        assert_eq!(TextureRemoval.class(&offered[0]), Class::Lossless);
+        assert_eq!(deviation(&shader, &facts, &offered[0]), Some([0.0; 4]));
+    }
+}

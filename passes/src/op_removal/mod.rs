@@ -425,3 +425,51 @@ fn take<'a>(
     }
     Ok(on_it)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::tests::shader;
+
+    #[test]
+    fn a_candidate_that_cannot_be_made_is_declined_with_the_reason() {
+        let shader = shader(
+            "@fragment fn main(@location(0) x: vec2f, @location(1) y: f32) -> @location(0) vec4f {
+                 let site = x * 2.0; let sum = x + vec2f(1.0);
+                 if y > 0.5 { discard; }
+                 return vec4f(site, sum);
+             }",
+        );
+        let candidate = |site: &str, choice: &str, value: &[f32]| Candidate {
+            pass: OpRemoval.name().into(),
+            site: site.into(),
+            choice: choice.into(),
+            value: value.iter().map(|number| number.to_bits()).collect(),
+        };
+        let reason = |site: &str, choice: &str, value: &[f32]| {
+            let declined = OpRemoval.applies(&shader, &candidate(site, choice, value));
+            declined.err().map_or(String::new(), |declined| declined.0)
+        };
+        assert_eq!(reason("site", "mean", &[0.5, 0.5]), "");
+        assert_eq!(reason("site", "keep x", &[]), "");
+        assert!(reason("site", "mean", &[0.5]).contains("bakes 1 numbers"));
+        assert!(reason("site", "mean", &[0.5, f32::NAN]).contains("not finite"));
+        assert!(reason("site", "keep y", &[]).contains("no operand"));
+        assert!(reason("nowhere", "mean", &[0.5]).contains("no value"));
+        assert!(reason("site", "halve", &[]).contains("no choice"));
+        assert!(reason("site", "without", &[]).contains("nothing else to keep"));
+        assert!(reason("site", "accept", &[]).contains("no `if`"));
+        let constant = format!("keep {}", {
+            let (stage, sum) = shader.find(&"sum".into()).expect("the test names a value");
+            let flow = Flow::new(&shader, stage).expect("it has the stage");
+            let mut constant = None;
+            operands::each(&flow.function.expressions[sum], |operand| {
+                if flow.is_constant(operand) {
+                    constant = Some(flow.id(operand).to_string());
+                }
+            });
+            constant.expect("one operand is constant")
+        });
+        assert!(reason("sum", &constant, &[]).contains("constant is not kept"));
+    }
+}

@@ -76,6 +76,8 @@ pub(super) struct Survey<'a> {
     holes: Vec<Holes>,
     /// For each value, whether it differs between fragments.
     varying: Vec<bool>,
+    /// For each value, whether a texture coordinate is computed from it.
+    leads_to_read: Vec<bool>,
     /// What each value alone costs.
     work: Vec<Work>,
 }
@@ -88,6 +90,7 @@ impl<'a> Survey<'a> {
             facts,
             holes: flow.holes(),
             varying: flow.varying(),
+            leads_to_read: leads_to_read(flow),
             work: cost::of_expressions(flow.module, &flow.function.expressions, &types),
         }
     }
@@ -240,6 +243,9 @@ impl<'a> Survey<'a> {
     /// Whether a texture would be read at the same coordinate by every fragment if a value were the
     /// same for all.
     fn stills_a_read(&self, site: Value) -> bool {
+        if !self.leads_to_read[site.index()] {
+            return false;
+        }
         let mut still = BTreeSet::from([site]);
         let mut next = BTreeSet::from_iter(self.flow.users(site));
         // Operands come before users, so that each value is settled when it is met.
@@ -374,5 +380,119 @@ impl<'a> Survey<'a> {
             });
         }
         work >= COSTLY
+    }
+}
+
+/// For each value, whether a texture coordinate is computed from it, other than through a variable.
+fn leads_to_read(flow: &Flow) -> Vec<bool> {
+    let mut leads = vec![false; flow.function.expressions.len()];
+    for (value, expression) in flow.function.expressions.iter().rev() {
+        match *expression {
+            Expression::ImageSample { coordinate, .. }
+            | Expression::ImageLoad { coordinate, .. } => leads[coordinate.index()] = true,
+            _ if leads[value.index()] => {
+                operands::each(expression, |operand| leads[operand.index()] = true);
+            }
+            _ => {}
+        }
+    }
+    leads
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facts::ValueFacts;
+    use crate::flow::tests::shader;
+    use crate::shader::Shader;
+
+    /// Facts in which `x` has this range, and everything else was seen between 0 and 1.
+    fn facts(shader: &Shader, range: (f32, f32)) -> Facts {
+        let flow = Flow::new(shader, crate::Stage::Fragment).expect("it has a fragment stage");
+        let mut facts = Facts::default();
+        for (value, _) in flow.function.expressions.iter() {
+            if let Some(count) = flow.floats(value) {
+                let id = flow.id(value).clone();
+                let (min, max) = if id.path() == "x" { range } else { (0.0, 1.0) };
+                let seen = ValueFacts {
+                    count: 9,
+                    mean: vec![0.5 * (min + max); count],
+                    min: vec![min; count],
+                    max: vec![max; count],
+                };
+                facts.values.insert(id, seen);
+            }
+        }
+        facts
+    }
+
+    /// Whether `site` may keep `x`, which has this range.
+    fn may_keep(site: &str, range: (f32, f32)) -> bool {
+        let shader = shader(&format!(
+            "@fragment fn main(@location(0) x: f32, @location(1) y: f32) -> @location(0) vec4f {{
+                 let guard = {site}; return vec4f(sqrt(guard), acos(guard), 1.0 / guard, y);
+             }}"
+        ));
+        let facts = facts(&shader, range);
+        OpRemoval
+            .candidates(&shader, &facts)
+            .iter()
+            .any(|candidate| {
+                candidate.site.path() == "guard" && candidate.choice.starts_with("keep x")
+            })
+    }
+
+    #[test]
+    fn a_guard_goes_only_when_samples_stay_away_from_its_limit() {
+        // Twice the limit, and an eighth of the range above it.
+        assert!(may_keep("max(x, 0.25)", (0.5, 0.75)));
+        assert!(!may_keep("max(x, 0.25)", (0.45, 0.75)));
+        assert!(may_keep("max(x, 0.0)", (0.125, 1.0)));
+        assert!(!may_keep("max(x, 0.0)", (0.1, 1.0)));
+        assert!(may_keep("abs(x)", (0.25, 1.0)));
+        assert!(!may_keep("abs(x)", (-1.0, 1.0)));
+        // Away from 1 by an eighth of the limit or of the range, above; by an eighth of the range, below.
+        assert!(may_keep("saturate(x)", (0.2, 0.8)));
+        assert!(!may_keep("saturate(x)", (0.2, 0.9)));
+        assert!(!may_keep("saturate(x)", (0.01, 0.8)));
+        assert!(may_keep("clamp(x, 0.125, 1.0)", (0.25, 0.75)));
+        assert!(!may_keep("clamp(x, 0.125, 1.0)", (0.2, 0.75)));
+        // A limit that varies counts with its worst number.
+        assert!(may_keep("max(x, y * 0.5)", (2.0, 3.0)));
+        assert!(!may_keep("max(x, y * 0.5)", (1.5, 3.0)));
+        // Not a number, or never seen.
+        assert!(!may_keep("max(x, 0.25)", (f32::NAN, f32::NAN)));
+    }
+
+    #[test]
+    fn what_is_no_guard_goes_freely() {
+        assert!(may_keep("x * y", (-1.0, 1.0)));
+        assert!(may_keep("x + y", (-1.0, 1.0)));
+        assert!(
+            !may_keep("x + 0.001", (0.0, 1.0)),
+            "a constant against zero"
+        );
+        assert!(may_keep("x + 0.001", (0.5, 1.0)));
+    }
+
+    #[test]
+    fn a_shared_value_goes_from_a_chain_of_operations() {
+        let shader = shader(
+            "@fragment fn main(@location(0) x: f32, @location(1) y: f32) -> @location(0) vec4f {
+                 let costly = exp(y) * sin(y); let first = x * costly; let second = first + costly;
+                 return vec4f(second);
+             }",
+        );
+        let facts = facts(&shader, (0.0, 1.0));
+        let candidates = OpRemoval.candidates(&shader, &facts);
+        let without = candidates
+            .iter()
+            .find(|candidate| candidate.site.path() == "costly" && candidate.choice == "without")
+            .expect("both operations have another side");
+        let after = OpRemoval.apply(&shader, without);
+        let point = after.function(crate::Stage::Fragment).expect("it has one");
+        let operations = point.expressions.iter();
+        let operations = operations.filter(|(_, e)| matches!(e, Expression::Binary { .. }));
+        assert_eq!(operations.count(), 0, "only x is left");
     }
 }
