@@ -9,7 +9,7 @@ mod search;
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect};
 
-use crate::emit::{self, Lock, Output};
+use crate::emit::{self, EmitLevel, Lock, Output};
 use crate::front::{Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Shader, normalize};
@@ -68,26 +68,23 @@ impl Request {
         self.beside("lod.toml")
     }
 
-    /// Puts emitted files in their place: their stem is the source's, and becomes that of the output. A single file
-    /// gets the very name that was asked for.
-    fn placed(&self, source: &Source, files: Files) -> Files {
-        let stem = Path::new(&source.name)
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned())
-            .unwrap_or_default();
+    /// Emits under the name that all outputs begin with, and puts the files in their place. A single file gets the
+    /// very name that was asked for.
+    fn emitted(&self, source: &Source, levels: &[EmitLevel]) -> Result<Files> {
+        let base = self.base();
+        let stem = base.file_name().unwrap_or_default().to_string_lossy();
+        let files = emit::emit_as(source, levels, self.emit, &stem)?;
         let single = files.len() == 1;
-        files
-            .into_iter()
-            .map(|(name, contents)| {
-                let name = name.to_string_lossy();
-                let ending = name.strip_prefix(&stem).unwrap_or(&name);
-                let place = match &self.output {
-                    Some(output) if single => output.clone(),
-                    _ => self.beside(ending.trim_start_matches('.')),
-                };
-                (place, contents)
-            })
-            .collect()
+        let placed = files.into_iter().map(|(name, contents)| {
+            let name = name.to_string_lossy();
+            let ending = name.strip_prefix(&*stem).unwrap_or(&name);
+            let place = match &self.output {
+                Some(output) if single => output.clone(),
+                _ => self.beside(ending.trim_start_matches('.')),
+            };
+            (place, contents)
+        });
+        Ok(placed.collect())
     }
 
     /// Refuses to write over what was read.
@@ -182,7 +179,7 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
             ),
         );
     }
-    let files = request.placed(&source, emit::emit(&source, &levels, request.emit)?);
+    let files = request.emitted(&source, &levels)?;
     request.spare(&files, std::slice::from_ref(&request.shader))?;
     Ok((files, warnings))
 }

@@ -80,8 +80,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let vertex = ready.vertex()?;
     let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     // What cannot be written should be known before a search that takes a minute.
-    let trial = emit::emit(&ready.source, &[], request.emit)?;
-    let trial = request.placed(&ready.source, trial);
+    let trial = request.emitted(&ready.source, &[])?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
 
@@ -100,10 +99,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .map(emit_level)
         .collect();
 
-    let mut files = request.placed(
-        &ready.source,
-        emit::emit(&ready.source, &levels, request.emit)?,
-    );
+    let mut files = request.emitted(&ready.source, &levels)?;
     let lock = request.lock();
     files.push((
         lock.clone(),

@@ -121,15 +121,28 @@ pub struct EmitLevel {
 /// Emits a shader with its levels. The files come back as names, to be put beside the source, and contents.
 ///
 /// # Errors
-/// When the form cannot be carried by the target, the thresholds do not rise, the source declares an `autoLOD`
-/// that cannot be used, or a writer has no form for something in the shader.
+/// As [`emit_as`].
 pub fn emit(
     source: &Source,
     levels: &[EmitLevel],
     output: Output,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+    emit_as(source, levels, output, &stem(source))
+}
+
+/// As [`emit`], with names that begin with `stem` in the place of the source's: that of the lock too, which
+/// the text names.
+///
+/// # Errors
+/// When the form cannot be carried by the target, the thresholds do not rise, the source declares an `autoLOD`
+/// that cannot be used, or a writer has no form for something in the shader.
+pub fn emit_as(
+    source: &Source,
+    levels: &[EmitLevel],
+    output: Output,
+    stem: &str,
+) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     check_thresholds(levels)?;
-    let stem = stem(source);
     let written = |stem: String, text: String| -> Result<Vec<(PathBuf, Vec<u8>)>> {
         let read = read_back(&text, source)?;
         match output.target {
@@ -139,7 +152,7 @@ pub fn emit(
     };
     match output.form {
         Form::Override | Form::Uniform => {
-            let spliced = splice::splice(source, levels, output.form)?;
+            let spliced = splice::splice(source, levels, output.form, stem)?;
             if output.target != Target::Wgsl && spliced.by_override {
                 return Err(no_override(output.target));
             }
@@ -148,7 +161,7 @@ pub fn emit(
         Form::Files => {
             let mut files = written(format!("{stem}.lod0"), source.text.clone())?;
             for (at, level) in levels.iter().enumerate() {
-                let text = splice::alone(source, at + 1, level)?;
+                let text = splice::alone(source, at + 1, level, stem)?;
                 files.extend(written(format!("{stem}.lod{}", at + 1), text)?);
             }
             Ok(files)

@@ -5,7 +5,7 @@ use super::names::{Names, in_words};
 use super::print::{Item, Owner, Printed, Wishes, print, value_name};
 use super::source::{Keyword, Text};
 use super::tokens::words;
-use super::{EmitLevel, Form, file_name, flaw, read_back, stem, tidy};
+use super::{EmitLevel, Form, file_name, flaw, read_back, tidy};
 use crate::front::Source;
 use crate::{Diagnostic, Result};
 use lodc_passes::shader::Stage;
@@ -62,13 +62,23 @@ impl<'a> Body<'a> {
 }
 
 /// The author's text, with the fragment entry point replaced by one that chooses among it and the levels.
-pub(crate) fn splice(source: &Source, levels: &[EmitLevel], form: Form) -> Result<Spliced> {
-    over_text(source, |body| spliced(body, levels, form))
+pub(crate) fn splice(
+    source: &Source,
+    levels: &[EmitLevel],
+    form: Form,
+    stem: &str,
+) -> Result<Spliced> {
+    over_text(source, |body| spliced(body, levels, form, stem))
 }
 
 /// A level as a module of its own, with the author's names.
-pub(crate) fn alone(source: &Source, number: usize, level: &EmitLevel) -> Result<String> {
-    over_text(source, |body| written_alone(body, number, level))
+pub(crate) fn alone(
+    source: &Source,
+    number: usize,
+    level: &EmitLevel,
+    stem: &str,
+) -> Result<String> {
+    over_text(source, |body| written_alone(body, number, level, stem))
 }
 
 /// Makes something of the author's text. Where that cannot be, because a declaration of the author's hides
@@ -118,12 +128,17 @@ fn composed(source: &Source) -> Result<(String, BTreeMap<String, String>)> {
 }
 
 /// `None` when a declaration of the text hides something predeclared that a level needs.
-fn spliced(body: &Body<'_>, levels: &[EmitLevel], form: Form) -> Result<Option<Spliced>> {
+fn spliced(
+    body: &Body<'_>,
+    levels: &[EmitLevel],
+    form: Form,
+    stem: &str,
+) -> Result<Option<Spliced>> {
     let (source, text) = (body.source, &body.text);
     let mut names = Names::default();
     names.reserve(text.words.iter().copied());
     let control = Control::new(body, form, &mut names)?;
-    let mut out = header(source, levels);
+    let mut out = header(source, levels, stem);
     let line_break = |out: &mut String| {
         if !out.is_empty() && !out.ends_with('\n') {
             out.push_str(text.line_end);
@@ -320,7 +335,12 @@ fn level_function(
 }
 
 /// A level's entry points with the declarations of the text that they need, as they stand there.
-fn written_alone(body: &Body<'_>, number: usize, level: &EmitLevel) -> Result<Option<String>> {
+fn written_alone(
+    body: &Body<'_>,
+    number: usize,
+    level: &EmitLevel,
+    stem: &str,
+) -> Result<Option<String>> {
     let (source, text) = (body.source, &body.text);
     let module = renamed_module(body, level);
     let entries: BTreeSet<&str> = module
@@ -414,7 +434,7 @@ fn written_alone(body: &Body<'_>, number: usize, level: &EmitLevel) -> Result<Op
         "// Level {number} of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
          // From autoLOD {:.2} on. {}\n\n",
         file_name(source),
-        stem(source),
+        stem,
         level.autolod,
         sentence(&level.says),
     );
@@ -471,13 +491,13 @@ fn uses_short_types(text: &Text<'_>) -> bool {
 }
 
 /// The comment at the top: a function of the levels and the file's name alone.
-fn header(source: &Source, levels: &[EmitLevel]) -> String {
+fn header(source: &Source, levels: &[EmitLevel], stem: &str) -> String {
     let mut out = format!(
         "// Levels of detail of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
          // level  autoLOD  error  cost  what changed\n\
          // 0      0.00     -      1.00  the original\n",
         file_name(source),
-        stem(source),
+        stem,
     );
     for (at, level) in levels.iter().enumerate() {
         writeln!(

@@ -122,6 +122,21 @@ fn the_header_lists_the_levels() {
 }
 
 #[test]
+fn another_name_is_that_of_the_lock_too() {
+    let source = source(SMALL);
+    let files = emit_as(&source, &[level(&source, 1.0)], Output::default(), "other")
+        .unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(files[0].0, Path::new("other.lod.wgsl"));
+    let text = String::from_utf8_lossy(&files[0].1);
+    assert!(
+        text.starts_with(
+            "// Levels of detail of test.wgsl, by lodc (lock format 1). Made from other.lod.toml:"
+        ),
+        "{text}"
+    );
+}
+
+#[test]
 fn level_0_in_files_is_the_source() {
     let source = source(SMALL);
     let files = emit(
@@ -268,7 +283,7 @@ fn entry_points_of_every_shape_are_called() {
     level.says.clear();
     source.text = "@fragment fn fs_main(@builtin(position) p: vec4f) { if p.x < 1.0 { discard; } }"
         .to_owned();
-    let text = splice::splice(&source, &[level], Form::Override)
+    let text = splice::splice(&source, &[level], Form::Override, "test")
         .unwrap_or_else(|e| panic!("{e}"))
         .text;
     has(
@@ -485,8 +500,9 @@ mod meaning {
     use crate::eval::lane::{LANES, Mask, Words};
     use crate::eval::machine::{Bindings, Machine};
     use crate::eval::program::Program;
-    use crate::scene::{Samples, Scene};
+    use crate::scene::Scene;
     use naga::{Module, ScalarKind, ShaderStage};
+    use rayon::prelude::*;
 
     /// What a module's fragment stage returns for fixed inputs, and which lanes it keeps; `None` when the evaluator
     /// does not run it.
@@ -533,42 +549,34 @@ mod meaning {
 
     #[test]
     fn every_level_does_what_its_variant_does() {
-        let mut seen = 0;
-        for path in shaders() {
-            let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
-            let scene = path.with_extension("toml");
-            let scene = Scene::read(&source, Some(scene.as_path()).filter(|path| path.is_file()));
-            let Ok(scene) = scene else {
-                println!("NOSCENE {}", path.display());
-                continue;
-            };
-            let frame = &scene.frames(scene.nearest, Samples::Search)[0];
-            let level = level(&source, 1.0);
-            let module = level.shader.module();
-            let wanted = outputs(module, &source.fragment, &frame.bindings);
-            assert!(wanted.is_some(), "{}", path.display());
-            let levels = [level];
-            let files = emit(&source, &levels, output(Form::Files, Target::Wgsl))
-                .unwrap_or_else(|e| panic!("{e}"));
-            let alone = read_back(&String::from_utf8_lossy(&files[1].1), &source)
-                .unwrap_or_else(|e| panic!("{e}"));
-            let got = outputs(&alone.module, &source.fragment, &frame.bindings);
-            assert!(got == wanted, "{} alone", path.display());
+        let paths = shaders();
+        assert!(paths.len() > 30, "{}", paths.len());
+        paths.par_iter().for_each(|path| {
+            let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
+            let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+            let bindings = &scene.frames(scene.nearest)[0].bindings;
+            let name = &source.fragment;
+            let levels = [level(&source, 1.0)];
+            let variant = outputs(levels[0].shader.module(), name, bindings);
+            assert!(variant.is_some(), "{}", path.display());
+
+            let files = emit(&source, &levels, output(Form::Files, Target::Wgsl));
+            let files = files.unwrap_or_else(|e| panic!("{e}"));
+            let text = String::from_utf8_lossy(&files[1].1);
+            let alone = read_back(&text, &source).unwrap_or_else(|e| panic!("{e}"));
+            let got = outputs(&alone.module, name, bindings);
+            assert!(got == variant, "{} alone", path.display());
+
             let files = emit(&source, &levels, Output::default()).unwrap_or_else(|e| panic!("{e}"));
-            let text = String::from_utf8_lossy(&files[0].1).into_owned();
-            if text.contains("override autoLOD") {
-                let original = outputs(&source.module, &source.fragment, &frame.bindings);
-                for (autolod, wanted) in [(0.0, &original), (0.99, &original), (1.0, &wanted)] {
-                    let got = outputs(
-                        &at(&text, &source, autolod),
-                        &source.fragment,
-                        &frame.bindings,
-                    );
-                    assert!(got == *wanted, "{} at {autolod}", path.display());
-                }
+            let text = String::from_utf8_lossy(&files[0].1);
+            if !text.contains("override autoLOD") {
+                return;
             }
-            seen += 1;
-        }
-        assert!(seen > 30, "{seen}");
+            let original = outputs(&source.module, name, bindings);
+            for (autolod, wanted) in [(0.0, &original), (0.99, &original), (1.0, &variant)] {
+                let got = outputs(&at(&text, &source, autolod), name, bindings);
+                assert!(got == *wanted, "{} at {autolod}", path.display());
+            }
+        });
     }
 }
