@@ -59,17 +59,6 @@ pub(crate) fn nearest<'n>(
     near.map(|(_, name)| name).take(most).collect()
 }
 
-/// A type's name with its article.
-pub(crate) fn article(name: &str) -> String {
-    // Scalars are spelt out: an f32, an i32, a u32.
-    let spelt = ["f", "i"].iter().any(|letter| {
-        let rest = name.strip_prefix(letter);
-        rest.is_some_and(|r| r.starts_with(|c: char| c.is_ascii_digit()))
-    });
-    let an = spelt || name.starts_with('a');
-    format!("{} {name}", if an { "an" } else { "a" })
-}
-
 /// How many characters must be put in, left out or changed to make one text of the other.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
@@ -158,20 +147,6 @@ mod tests {
         assert_eq!(nearest("paint.glos", members, 3), ["paint.gloss"]);
         assert!(nearest("xyz", names, 2).is_empty());
         assert_eq!(edit_distance("kitten", "sitting"), 3);
-    }
-
-    #[test]
-    fn articles_are_as_spoken() {
-        for (name, spoken) in [
-            ("f32", "an f32"),
-            ("i32", "an i32"),
-            ("u32", "a u32"),
-            ("array<f32, 2>", "an array<f32, 2>"),
-            ("vec3<f32>", "a vec3<f32>"),
-            ("fog", "a fog"),
-        ] {
-            assert_eq!(article(name), spoken);
-        }
     }
 
     #[test]

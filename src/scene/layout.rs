@@ -77,6 +77,17 @@ fn scalar_name(kind: ScalarKind, width: u8) -> &'static str {
     }
 }
 
+/// A type's name with its article.
+pub(super) fn article(name: &str) -> String {
+    // Scalars are spelt out: an f32, an i32, a u32.
+    let spelt = ["f", "i"].iter().any(|letter| {
+        let rest = name.strip_prefix(letter);
+        rest.is_some_and(|r| r.starts_with(|c: char| c.is_ascii_digit()))
+    });
+    let an = spelt || name.starts_with('a');
+    format!("{} {name}", if an { "an" } else { "a" })
+}
+
 /// A part of a buffer: the buffer itself, a member, an element.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Place {
@@ -321,6 +332,20 @@ mod tests {
             runtime: 0,
         };
         test(&Layout::new(&module), root)
+    }
+
+    #[test]
+    fn articles_are_as_spoken() {
+        for (name, spoken) in [
+            ("f32", "an f32"),
+            ("i32", "an i32"),
+            ("u32", "a u32"),
+            ("array<f32, 2>", "an array<f32, 2>"),
+            ("vec3<f32>", "a vec3<f32>"),
+            ("fog", "a fog"),
+        ] {
+            assert_eq!(article(name), spoken);
+        }
     }
 
     #[test]

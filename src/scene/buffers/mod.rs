@@ -5,12 +5,12 @@ mod value;
 
 use super::camera::{Pose, Sphere};
 use super::file::{Entries, Toml};
-use super::layout::{LARGEST, Layout, Leaf, Place};
+use super::layout::{LARGEST, Layout, Leaf, Place, article};
 use super::semantic::Semantic;
 use super::{Inference, Missing};
 use crate::eval::machine::Resource;
 use crate::front::Source;
-use crate::front::names::{article, words};
+use crate::front::names::words;
 use crate::{Diagnostic, Result};
 use naga::valid::GlobalUse;
 use naga::{AddressSpace, GlobalVariable, Handle, Module, ScalarKind};

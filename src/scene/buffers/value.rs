@@ -3,9 +3,9 @@
 use super::{Fill, bound, is_in, root};
 use crate::Result;
 use crate::front::Source;
-use crate::front::names::{article, listed};
+use crate::front::names::listed;
 use crate::scene::file::{Entries, Node, Toml, suggest};
-use crate::scene::layout::{Layout, Leaf, Place};
+use crate::scene::layout::{Layout, Leaf, Place, article};
 use crate::scene::semantic::Semantic;
 use naga::{AddressSpace, ScalarKind};
 use toml::Spanned;
