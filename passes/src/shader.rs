@@ -1,6 +1,6 @@
 //! A [`Shader`]: a valid naga module in normal form, with a stable [`ValueId`] for every value.
 //!
-//! Normal form is made by [`crate::normalize`] and changed only by [`crate::edit`].
+//! Normal form is made by [`mod@crate::normalize`] and changed only by [`crate::edit`].
 //! The module holds the chosen entry points and no other function.
 
 use crate::flow::Findings;

@@ -4,8 +4,8 @@
 //! Control flow stays, and so does behaviour, to the bit. What cannot be analysed, such as an array
 //! that is indexed dynamically, stays in memory. Normal form is a fixed point of this function.
 //!
-//! The steps, each of which gives a valid module again: [`returns`], [`inline`], then [`split`],
-//! [`forward`] and [`crate::live`] until nothing changes, and [`names`] at the end.
+//! The steps, each of which gives a valid module again: `returns`, `inline`, then `split`,
+//! `forward` and `crate::live` until nothing changes, and `names` at the end.
 
 pub(crate) mod forward;
 mod inline;

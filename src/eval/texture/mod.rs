@@ -1,6 +1,6 @@
 //! Textures and samplers: texels in linear light, MIP levels, what is known of their images.
 //!
-//! A texture is made of decoded [`Image`]s and read by blocks of lanes, see [`sample`].
+//! A texture is made of decoded [`Image`]s and read by blocks of lanes, see `sample`.
 
 mod mip;
 mod placeholder;
