@@ -642,6 +642,89 @@ mod tests {
         );
     }
 
+    /// The normal form of a small shader, and a lock that does nothing to it.
+    fn small() -> (Shader, Lock) {
+        let text = "@fragment fn main(@location(0) v: vec4f) -> @location(0) vec4f {
+            let shine = pow(v.x, 3.0) * v.y;
+            return vec4f(shine) + v;
+        }";
+        let module = naga::front::wgsl::parse_str(text).expect("it is WGSL");
+        let base =
+            lodc_passes::normalize(&module, None, "main", 1000).expect("it has a normal form");
+        let mut lock = lock();
+        lock.source.normal_form = base.fingerprint().to_string();
+        lock.source.fragment = "main".into();
+        for level in &mut lock.levels {
+            level.recipe = Recipe::default();
+        }
+        (base, lock)
+    }
+
+    #[test]
+    fn a_recipe_replays_as_it_was_applied() {
+        let (base, mut lock) = small();
+        let facts = lodc_passes::Facts::default();
+        let candidate = PASSES
+            .iter()
+            .flat_map(|pass| pass.candidates(&base, &facts))
+            .next()
+            .expect("there is something to simplify");
+        let recipe = Recipe(vec![candidate]);
+        let wanted = recipe.replay(&base).expect("it applies");
+        lock.levels[1].recipe = recipe;
+        let text = lock.to_toml();
+        let read = Lock::parse("a.lod.toml", &text).expect("it reads");
+        let levels = read
+            .replay(&base, "a.lod.toml", &text)
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(levels[0].shader.fingerprint(), base.fingerprint());
+        assert_eq!(levels[1].shader.fingerprint(), wanted.fingerprint());
+        assert_ne!(levels[1].shader.fingerprint(), base.fingerprint());
+        assert_eq!(
+            (levels[1].autolod, &*levels[0].says),
+            (4.25, "größe, \"so\" it\\is")
+        );
+    }
+
+    #[test]
+    fn a_stale_lock_says_how_to_renew_it() {
+        let (base, mut lock) = small();
+        lock.source.normal_form = "0123".into();
+        let text = lock.to_toml();
+        let error = lock
+            .replay(&base, "a.lod.toml", &text)
+            .expect_err("it is stale");
+        assert!(error.message.contains("stale"), "{error}");
+        assert_eq!(&text[error.labels[0].0.clone()], "0123");
+        assert!(error.notes[0].contains("without `--locked`"), "{error}");
+    }
+
+    #[test]
+    fn a_step_that_no_longer_applies_is_shown() {
+        let (base, mut lock) = small();
+        lock.levels[1].recipe = Recipe(vec![Candidate {
+            pass: "op-removal".into(),
+            site: "main.gone.mul".into(),
+            choice: "keep main.gone".into(),
+            value: Vec::new(),
+        }]);
+        let text = lock.to_toml();
+        let error = lock
+            .replay(&base, "a.lod.toml", &text)
+            .expect_err("there is no such value");
+        assert!(
+            error
+                .message
+                .contains("op-removal main.gone.mul keep main.gone"),
+            "{error}"
+        );
+        assert!(
+            text[error.labels[0].0.clone()].starts_with("{ pass"),
+            "{error}"
+        );
+        assert!(error.render(false).contains("a.lod.toml:"), "{error}");
+    }
+
     #[test]
     fn figures_are_short() {
         assert_eq!(figure(0.019_023_847), 0.01902);

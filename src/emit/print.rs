@@ -36,8 +36,6 @@ pub(crate) struct Printed {
     pub(crate) directives: Vec<String>,
     /// Its declarations, in the writer's order.
     pub(crate) items: Vec<Item>,
-    /// Names at module scope that could not stay, and what they became.
-    pub(crate) renamed: BTreeMap<String, String>,
 }
 
 /// A function of a module.
@@ -70,15 +68,11 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     let mut labels = Labels::default();
     let mut taken = wishes.taken.clone();
     let mut locals = wishes.outside.clone();
-    let mut renamed = BTreeMap::new();
     let mut global = |wish: Option<&str>, fallback: &str| -> String {
         let name = match wish {
             Some(name) if (wishes.keep)(name) => name.to_owned(),
             _ => taken.take(wish.unwrap_or(fallback)),
         };
-        if let Some(wish) = wish.filter(|wish| **wish != name) {
-            renamed.insert(wish.to_owned(), name.clone());
-        }
         taken.reserve([name.as_str()]);
         locals.reserve([name.as_str()]);
         name
@@ -151,7 +145,6 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     let mut printed = Printed {
         directives: text.directives.iter().map(|d| (*d).to_owned()).collect(),
         items: Vec::new(),
-        renamed,
     };
     for declaration in &text.declarations {
         let raw = &written[declaration.span.clone()];

@@ -1,6 +1,7 @@
 //! The author's WGSL text: its declarations, its entry points, and the edits that turn one of them
 //! into an ordinary function. Everything else of the text stays as it is, byte for byte.
 
+use super::tidy::is_generic;
 use super::tokens::{Kind, Token, tokens, words};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -178,6 +179,58 @@ impl<'a> Text<'a> {
             }
         }
         self.tokens.len()
+    }
+
+    /// The text with names of module scope replaced. A local of such a name gets the new one too, since it is one
+    /// there for all that reads it; members, attributes' words, directives and address spaces are something else.
+    pub(crate) fn renamed(&self, names: &BTreeMap<String, String>) -> String {
+        let mut out = String::with_capacity(self.text.len());
+        let mut copied = 0;
+        let mut at = 0;
+        let is_in_struct = |place: usize| {
+            let mut structs = self
+                .declarations
+                .iter()
+                .filter(|d| d.keyword == Keyword::Struct);
+            structs.any(|d| d.tokens.contains(&place))
+        };
+        while at < self.tokens.len() {
+            match self.word(at) {
+                "@" if matches!(self.word(at + 1), "builtin" | "interpolate" | "diagnostic") => {
+                    at = self.after_attribute(at);
+                    continue;
+                }
+                "@" | "." => {
+                    at += 2;
+                    continue;
+                }
+                "enable" | "requires" | "diagnostic" if self.is_word(at) => {
+                    at = self.after_item(at);
+                    continue;
+                }
+                "var" if self.word(at + 1) == "<" => {
+                    while at < self.tokens.len() && self.word(at) != ">" {
+                        at += 1;
+                    }
+                }
+                _ => {}
+            }
+            let is_member = self.word(at + 1) == ":" && is_in_struct(at);
+            if let Some(name) = names.get(self.word(at)).filter(|_| !is_member) {
+                let span = &self.tokens[at].span;
+                out.push_str(&self.text[copied..span.start]);
+                out.push_str(name);
+                copied = span.end;
+            }
+            at += 1;
+        }
+        out.push_str(&self.text[copied..]);
+        out
+    }
+
+    /// Whether its author writes `vec3f` rather than `vec3<f32>`, or neither.
+    pub(crate) fn uses_short_types(&self) -> bool {
+        !(0..self.tokens.len()).any(|at| is_generic(self.word(at)) && self.word(at + 1) == "<")
     }
 
     /// The declaration of a name at module scope.
@@ -398,6 +451,22 @@ mod tests {
                 .signature("main")
                 .expect("it is there")
                 .returns
+        );
+    }
+
+    #[test]
+    fn renames_what_a_declaration_means_and_no_namesake() {
+        let text = Text::new(
+            "enable mix; // mix
+            struct S { @builtin(mix) @location(mix) mix: f32, b: mix }
+            var<mix> mix: S; fn f(mix: S) -> f32 { let a = s.mix + mix.mix; return mix(a, .5); }",
+        );
+        let names = BTreeMap::from([("mix".to_owned(), "mix_b".to_owned())]);
+        assert_eq!(
+            text.renamed(&names),
+            "enable mix; // mix
+            struct S { @builtin(mix) @location(mix_b) mix: f32, b: mix_b }
+            var<mix> mix_b: S; fn f(mix_b: S) -> f32 { let a = s.mix + mix_b.mix; return mix_b(a, .5); }"
         );
     }
 

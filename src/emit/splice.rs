@@ -1,11 +1,11 @@
 //! Puts levels behind the author's text, or each into a file of its own.
 
 use super::lock::FORMAT;
-use super::names::{Names, in_words};
+use super::names::{Names, in_words, is_predeclared};
 use super::print::{Item, Owner, Printed, Wishes, print, value_name};
 use super::source::{Keyword, Text};
 use super::tokens::words;
-use super::{EmitLevel, Form, file_name, flaw, read_back, tidy};
+use super::{EmitLevel, Form, file_name, flaw, read_back};
 use crate::front::Source;
 use crate::{Diagnostic, Result};
 use lodc_passes::shader::Stage;
@@ -53,11 +53,11 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Whether an item means something predeclared that a declaration of the text hides.
-    fn hides_from(&self, item: &Item) -> bool {
-        item.predeclared
-            .iter()
-            .any(|word| self.declared.contains(word.as_str()))
+    /// The predeclared word that an item needs and a declaration of the text hides.
+    fn hidden_from(&self, item: &Item) -> Option<Hidden> {
+        let mut words = item.predeclared.iter();
+        let hidden = words.find(|word| self.declared.contains(word.as_str()))?;
+        Some(Hidden(hidden.clone()))
     }
 }
 
@@ -81,59 +81,58 @@ pub(crate) fn alone(
     over_text(source, |body| written_alone(body, number, level, stem))
 }
 
+/// A predeclared word that a level needs, and that a declaration of the text hides.
+struct Hidden(String);
+
 /// Makes something of the author's text. Where that cannot be, because a declaration of the author's hides
-/// something predeclared that a level needs, of a text of our own in which it has another name.
-fn over_text<T>(source: &Source, make: impl Fn(&Body<'_>) -> Result<Option<T>>) -> Result<T> {
-    let body = Body::new(source, &source.text, &source.module, BTreeMap::new());
-    if let Some(made) = make(&body)? {
-        return Ok(made);
-    }
-    let (composed, renamed) = composed(source)?;
-    let module = read_back(&composed, source)?.module;
-    let body = Body::new(source, &composed, &module, renamed);
-    make(&body)?.ok_or_else(|| {
-        flaw(
-            Diagnostic::error("internal error: names still clash in a composed module"),
-            source,
-        )
-    })
-}
-
-/// The whole source as one text in which nothing hides what is predeclared, and what got other names in it.
-fn composed(source: &Source) -> Result<(String, BTreeMap<String, String>)> {
+/// something predeclared that a level needs, of the text with that declaration under another name.
+fn over_text<T>(
+    source: &Source,
+    make: impl Fn(&Body<'_>) -> Result<std::result::Result<T, Hidden>>,
+) -> Result<T> {
     let text = Text::new(&source.text);
-    let settings = source.module.overrides.iter();
-    let kept: BTreeSet<&str> = (source.module.entry_points.iter())
-        .map(|entry| entry.name.as_str())
-        .chain(settings.filter_map(|(_, setting)| setting.name.as_deref()))
-        .collect();
-    let printed = print(
-        &source.module,
-        &Wishes {
-            keep: &|name| kept.contains(name),
-            taken: &Names::default(),
-            outside: &Names::default(),
-            value: &|_, _| None,
-            short_types: uses_short_types(&text),
-        },
-    )
-    .map_err(|reason| unwritable(source, &reason))?;
-    let items: Vec<(Keyword, &str)> = printed
-        .items
-        .iter()
-        .map(|item| (item.keyword, item.text.as_str()))
-        .collect();
-    let composed = assembled("", &directives(&text, &printed), &items);
-    Ok((composed, printed.renamed))
+    let mut names = Names::default();
+    names.reserve(text.words.iter().copied());
+    let mut renamed: BTreeMap<String, String> = BTreeMap::new();
+    let mut body = Body::new(source, &source.text, &source.module, BTreeMap::new());
+    let (mut now, mut module);
+    loop {
+        let Hidden(word) = match make(&body)? {
+            Ok(made) => return Ok(made),
+            Err(hidden) => hidden,
+        };
+        // The host knows pipeline constants and entry points by their names.
+        let entries = &source.module.entry_points;
+        let declaration = text
+            .declaration(&word)
+            .filter(|d| d.keyword != Keyword::Override && entries.iter().all(|e| e.name != word));
+        if declaration.is_none() || renamed.contains_key(&word) {
+            let error = Diagnostic::error(format!(
+                "`{word}` hides what WGSL calls so, which a level needs"
+            ))
+            .with_source(&source.name, &source.text);
+            let error = match text.declaration(&word) {
+                Some(d) => error.with_label(d.name_span.clone(), "declared here"),
+                None => error,
+            };
+            return Err(error.with_note(
+                "the host knows it by its name, so lodc cannot give it another: rename it",
+            ));
+        }
+        let name = names.take(&word);
+        renamed.insert(word, name);
+        now = text.renamed(&renamed);
+        module = read_back(&now, source)?.module;
+        body = Body::new(source, &now, &module, renamed.clone());
+    }
 }
 
-/// `None` when a declaration of the text hides something predeclared that a level needs.
 fn spliced(
     body: &Body<'_>,
     levels: &[EmitLevel],
     form: Form,
     stem: &str,
-) -> Result<Option<Spliced>> {
+) -> Result<std::result::Result<Spliced, Hidden>> {
     let (source, text) = (body.source, &body.text);
     let mut names = Names::default();
     names.reserve(text.words.iter().copied());
@@ -150,7 +149,7 @@ fn spliced(
         if let Some(declaration) = &control.declaration {
             write!(out, "\n{declaration}").ok();
         }
-        return Ok(Some(Spliced {
+        return Ok(Ok(Spliced {
             text: with_line_ends(out, text),
             by_override: control.by_override,
         }));
@@ -210,8 +209,8 @@ fn spliced(
             if body.declared.contains(&*name) || !done.insert(name.clone()) {
                 continue;
             }
-            if body.hides_from(item) {
-                return Ok(None);
+            if let Some(hidden) = body.hidden_from(item) {
+                return Ok(Err(hidden));
             }
             wanted.extend(item.uses.iter().cloned());
             wanted.extend(
@@ -240,7 +239,7 @@ fn spliced(
     for item in &extra {
         write!(out, "\n{}", item.text).ok();
     }
-    Ok(Some(Spliced {
+    Ok(Ok(Spliced {
         text: with_line_ends(out, text),
         by_override: control.by_override,
     }))
@@ -328,7 +327,7 @@ fn level_function(
                 let is_own = owner == Owner::Function(handle);
                 is_own.then(|| value_name(&level.shader, Stage::Fragment, value))?
             },
-            short_types: uses_short_types(&body.text),
+            short_types: body.text.uses_short_types(),
         },
     )
     .map_err(|reason| unwritable(body.source, &reason))
@@ -340,7 +339,7 @@ fn written_alone(
     number: usize,
     level: &EmitLevel,
     stem: &str,
-) -> Result<Option<String>> {
+) -> Result<std::result::Result<String, Hidden>> {
     let (source, text) = (body.source, &body.text);
     let module = renamed_module(body, level);
     let entries: BTreeSet<&str> = module
@@ -369,7 +368,7 @@ fn written_alone(
                 };
                 value_name(&level.shader, stage, value)
             },
-            short_types: uses_short_types(text),
+            short_types: text.uses_short_types(),
         },
     )
     .map_err(|reason| unwritable(source, &reason))?;
@@ -392,8 +391,8 @@ fn written_alone(
             let words = words(&text.text[declaration.span.clone()]);
             wanted.extend(words.into_iter().filter(|word| own(word).is_some()));
         } else if let Some(item) = printed.items.iter().find(|item| item.name == name) {
-            if body.hides_from(item) {
-                return Ok(None);
+            if let Some(hidden) = body.hidden_from(item) {
+                return Ok(Err(hidden));
             }
             wanted.extend(
                 item.uses
@@ -440,7 +439,7 @@ fn written_alone(
     );
     let items: Vec<(Keyword, &str)> = items.iter().map(|(k, text)| (*k, text.as_str())).collect();
     let written = assembled(&header, &directives(text, &printed), &items);
-    Ok(Some(with_line_ends(written, text)))
+    Ok(Ok(with_line_ends(written, text)))
 }
 
 /// Directives of the author's, then those that the writer asks for beside them.
@@ -483,11 +482,6 @@ fn unwritable(source: &Source, reason: &str) -> Box<Diagnostic> {
         file_name(source)
     ));
     flaw(error, source)
-}
-
-/// Whether types are written `vec3f`: unless the author writes `vec3<f32>`.
-fn uses_short_types(text: &Text<'_>) -> bool {
-    !text.words.iter().any(|word| tidy::is_generic(word))
 }
 
 /// The comment at the top: a function of the levels and the file's name alone.

@@ -303,15 +303,47 @@ fn what_the_author_hides_gets_another_name() {
     );
     // Nothing that the levels need is hidden, so the text stands.
     has(&text, "const length = 3.0;");
+    let text = "// A colour.
+        @group(0) @binding(0) var<uniform> select: vec4f; // and its use
+        struct Pair { select: f32, mix: f32 }
+        override gain = 2.0; override twice = gain * 2.0;
+        fn saturate(a: f32) -> f32 { let p = Pair(a * twice, 1.0); return p.select; }
+        @fragment fn fs_main(@location(0) v: vec2f) -> @location(0) vec4f {
+            var x = 1.0;
+            if v.x > 0.5 { x = v.y; }
+            return vec4f(saturate(v.x)) + select * x;
+        }";
+    let spliced = emitted(text, Form::Override);
+    has(
+        &spliced,
+        "var<uniform> select_b: vec4f; // and its use\n        struct Pair { select: f32, mix: f32 }",
+    );
+    has(
+        &spliced,
+        "fn saturate(a: f32) -> f32 { let p = Pair(a * twice, 1.0); return p.select; }",
+    );
+    has(&spliced, "return vec4f(saturate(v.x)) + select_b * x;");
+    has(&spliced, "= select(1.0, v.y, v.x > 0.5);");
+    let alone = emitted(text, Form::Files);
+    has(&alone, "var<uniform> select_b: vec4f;");
+    has(&alone, "override twice = gain * 2.0;");
+    has(&alone, "= select(1.0, v.y, v.x > 0.5);");
+}
+
+#[test]
+fn a_name_that_the_host_knows_cannot_change() {
+    let text = "override select = 2.0;
+        @fragment fn fs_main(@location(0) v: vec2f) -> @location(0) vec4f {
+            var x = 1.0;
+            if v.x > 0.5 { x = v.y; }
+            return vec4f(select * x);
+        }";
+    let source = source(text);
     for form in [Form::Override, Form::Files] {
-        let text = emitted(
-            "@group(0) @binding(0) var<uniform> vec4: vec4f; override step = 2.0; fn vec2(a: f32) -> f32 { return a * step; }
-             @fragment fn fs_main(@location(0) v: vec2f) -> @location(0) vec4f { return vec4f(vec2(v.x)) + vec4; }",
-            form,
-        );
-        has(&text, "var<uniform> vec4_b: vec4");
-        has(&text, "override step: f32 = 2");
-        assert_eq!(text.matches("@binding").count(), 1, "{text}");
+        let error = emit(&source, &[level(&source, 1.0)], output(form, Target::Wgsl))
+            .expect_err("the level needs `select`");
+        assert_eq!(&text[error.labels[0].0.clone()], "select");
+        assert!(!error.notes.is_empty());
     }
 }
 
