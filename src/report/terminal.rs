@@ -48,12 +48,12 @@ pub fn table(report: &Report) -> String {
     )
 }
 
-/// Samples of a fragment on average: whole numbers without a point.
+/// Samples of a fragment on average: to a tenth, whole numbers without a point.
 fn samples(count: f64) -> String {
-    if count.fract() == 0.0 {
-        format!("{count:.0}")
-    } else {
-        format!("{count:.1}")
+    let rounded = format!("{count:.1}");
+    match rounded.strip_suffix(".0") {
+        Some(whole) => whole.to_owned(),
+        None => rounded,
     }
 }
 

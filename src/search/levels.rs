@@ -133,16 +133,22 @@ pub fn find(
         let mut frontier = Frontier::default();
         frontier.add(base.seen());
         variants += descent.run(start, &mut prices, &mut frontier);
+        let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
+        let interval = [distance, (distance * next).sqrt(), next];
+        let checks = |samples| {
+            let check = |distance| Check::new(stand, distance, samples);
+            interval
+                .into_iter()
+                .map(check)
+                .collect::<std::result::Result<Vec<_>, _>>()
+        };
+        let quick = checks(Samples::Search)?;
         let feasible: Vec<&Seen> = frontier
             .members()
             .iter()
-            .filter(|member| member.square <= limit)
+            .filter(|member| member.square <= limit && passes_all(stand, member, &quick))
             .collect();
-        let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
-        let checks = [distance, (distance * next).sqrt(), next]
-            .map(|distance| Check::new(stand, distance))
-            .into_iter()
-            .collect::<std::result::Result<Vec<_>, _>>()?;
+        let checks = checks(Samples::Full)?;
         if let Some(level) = cheapest_confirmed(stand, &feasible, &checks) {
             let before = &levels[levels.len() - 1];
             if level.cost < (1.0 - MERGE_BELOW) * before.cost {
@@ -171,16 +177,28 @@ fn threshold(scene: &Scene, distance: f64) -> f64 {
     (scene.auto_lod(distance) * 100.0).ceil() / 100.0
 }
 
-/// The full set of samples at one distance of a level's interval, and the bound there.
+/// Whether a member is within the bound at every distance.
+fn passes_all(stand: &Stand<'_>, member: &Seen, checks: &[Check<'_>]) -> bool {
+    member.recipe.replay(stand.base).is_ok_and(|shader| {
+        let passes = |check: &Check<'_>| check.set.measure(&shader).is_ok_and(|m| check.passes(&m));
+        checks.iter().all(passes)
+    })
+}
+
+/// Samples at one distance of a level's interval, and the bound there.
 struct Check<'a> {
     set: SampleSet<'a>,
     bound: f64,
 }
 
 impl<'a> Check<'a> {
-    fn new(stand: &'a Stand<'a>, distance: f64) -> std::result::Result<Self, Refused> {
+    fn new(
+        stand: &'a Stand<'a>,
+        distance: f64,
+        samples: Samples,
+    ) -> std::result::Result<Self, Refused> {
         Ok(Self {
-            set: SampleSet::new(stand, distance, Samples::Full)?,
+            set: SampleSet::new(stand, distance, samples)?,
             bound: stand.scene.bound(distance),
         })
     }

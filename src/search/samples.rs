@@ -2,7 +2,7 @@
 //! the reference beside them. A variant is then one run of its fragment program.
 
 use super::error::{ErrorSum, ReferencePixel, displayed, encoded};
-use crate::eval::draw::{Shading, each_visible, resolve, shade_into};
+use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::machine::Bindings;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::{Coverage, rasterize};
@@ -60,6 +60,8 @@ pub struct SampleSet<'a> {
 struct Rasterised {
     bindings: Bindings,
     coverage: Coverage,
+    /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
+    seen: Option<Coverage>,
     /// The pixels that the reference or a fragment covers.
     reference: Vec<ReferencePixel>,
     /// For each covered fragment, its place in `reference`.
@@ -171,7 +173,8 @@ impl<'a> SampleSet<'a> {
             .par_iter()
             .map(|frame| {
                 let mut shading = Shading::default();
-                shade_into(&program, &frame.coverage, &frame.bindings, &mut shading);
+                let seen = frame.seen.as_ref().unwrap_or(&frame.coverage);
+                shade_into(&program, seen, &frame.bindings, &mut shading);
                 shading.profile.probes
             })
             .collect();
@@ -238,8 +241,7 @@ impl Rasterised {
             .filter(|(_, c)| **c > 0.0)
             .map(|(i, _)| i)
             .collect();
-        let seen = coverage.blocks.iter().flat_map(|block| block.pixels);
-        pixels.extend(seen.filter(|pixel| *pixel != u32::MAX));
+        pixels.extend(coverage.pixels());
         pixels.sort_unstable();
         pixels.dedup();
         let mut places = vec![0; coverage.fragments];
@@ -257,6 +259,10 @@ impl Rasterised {
                     ReferencePixel::new([r, g, b], covered(pixel))
                 })
                 .collect(),
+            seen: coverage.late.then(|| {
+                shade_into(original, &coverage, &bindings, &mut shading);
+                seen(&coverage, &shading)
+            }),
             places,
             bindings,
             coverage,
