@@ -187,7 +187,12 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
 /// The way from a folder to a file, with forward slashes; the file's own path when there is none.
 #[cfg(feature = "search")]
 fn relative(folder: &Path, file: &Path) -> String {
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let absolute = |path: &Path| {
+        // The folder of a bare file name is empty, and means the current one.
+        let empty = path.as_os_str().is_empty();
+        let path = if empty { Path::new(".") } else { path };
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    };
     let (from, to) = (absolute(folder), absolute(file));
     let shared = from
         .components()

@@ -148,7 +148,7 @@ pub fn inspection(
             Some((saved, added, candidate)) => (
                 format!("{:.1} %", saved * 100.0),
                 format!("{added:.4}"),
-                candidate.choice.clone(),
+                short(&candidate.choice).to_owned(),
             ),
             None => ("-".to_owned(), "-".to_owned(), String::new()),
         };
@@ -161,6 +161,11 @@ pub fn inspection(
     }
     let table = columns(&rows, &[false, true, true, false, false, true]);
     format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n")
+}
+
+/// A choice without the hash of the value that it names.
+fn short(choice: &str) -> &str {
+    choice.split_once('#').map_or(choice, |(named, _)| named)
 }
 
 /// Rows as aligned columns, two spaces in front; `left` says which are aligned to the left.
