@@ -8,7 +8,7 @@ mod reference;
 use lodc::eval::lane::{LANES, Mask, Words};
 use lodc::eval::machine::{Bindings, Machine, Resource};
 use lodc::eval::program::Program;
-use lodc_passes::{Shader, normalize};
+use lodc_passes::{Facts, PASSES, Shader, normalize};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, ScalarKind};
 use std::fmt::Write as _;
@@ -61,6 +61,36 @@ fn source_and_normal_form_compute_the_same_bits() {
                  {drawn:x?}\n{source}\n{}",
                 text(&normal)
             );
+        }
+    }
+}
+
+#[test]
+fn passes_keep_random_shaders_valid() {
+    let facts = Facts::default();
+    for seed in 0..SHADERS {
+        let source = Author::new(seed).shader();
+        let module = naga::front::wgsl::parse_str(&source)
+            .unwrap_or_else(|e| panic!("seed {seed}: {}", e.emit_to_string(&source)));
+        let mut shader = normalize(&module, None, "fs_main", LIMIT)
+            .unwrap_or_else(|e| panic!("seed {seed}: {e}\n{source}"));
+        for step in 0..4 {
+            let all: Vec<_> = PASSES
+                .iter()
+                .flat_map(|pass| {
+                    let candidates = pass.candidates(&shader, &facts).into_iter();
+                    candidates.map(move |candidate| (pass, candidate))
+                })
+                .collect();
+            let Some((pass, candidate)) = all.get((step * 131 + seed as usize) % all.len().max(1))
+            else {
+                break;
+            };
+            let before = text(&shader);
+            shader = pass.apply(&shader, candidate);
+            if let Err(error) = shader.validate() {
+                panic!("seed {seed}: {candidate}: {error:?}\n{before}");
+            }
         }
     }
 }
