@@ -10,6 +10,9 @@
 //! The author's text stays as it is; level 0 is that text. Everything here is a function of its arguments,
 //! and [`write_atomically`] is the only thing that touches the disk.
 
+mod alone;
+mod body;
+mod control;
 mod lines;
 mod lock;
 mod names;
@@ -161,7 +164,7 @@ pub fn emit_as(
         Form::Files => {
             let mut files = written(format!("{stem}.lod0"), source.text.clone())?;
             for (at, level) in levels.iter().enumerate() {
-                let text = splice::alone(source, at + 1, level, stem)?;
+                let text = alone::alone(source, at + 1, level, stem)?;
                 files.extend(written(format!("{stem}.lod{}", at + 1), text)?);
             }
             Ok(files)

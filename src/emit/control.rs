@@ -1,0 +1,137 @@
+//! What a level is chosen by: an autoLOD of the author's, or one that is declared behind the text.
+
+use super::Form;
+use super::body::Body;
+use super::names::Names;
+use crate::{Diagnostic, Result};
+use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
+
+/// Where a level is chosen by.
+pub(crate) struct Control {
+    /// The expression that reads it.
+    pub(crate) value: String,
+    /// The name at module scope that the expression starts with.
+    pub(crate) root: String,
+    /// What has to be declared for it.
+    pub(crate) declaration: Option<String>,
+    /// Whether it is a pipeline constant.
+    pub(crate) by_override: bool,
+}
+
+/// The name that the host knows.
+const NAME: &str = "autoLOD";
+
+impl Control {
+    /// Finds the author's, or makes one in this form.
+    ///
+    /// # Errors
+    /// When the author's is nothing that a host sets.
+    pub(crate) fn new(body: &Body<'_>, form: Form, names: &mut Names) -> Result<Self> {
+        let (source, text, module) = (body.source, &body.text, body.module);
+        if let Some(own) = Self::own(module) {
+            return Ok(own);
+        }
+        if let Some(declaration) = text.declaration(NAME) {
+            let shift = source.text.len() - text.text.len();
+            let span = declaration.name_span.clone();
+            return Err(Diagnostic::error(format!(
+                "`{NAME}` is declared, but not as something that a host sets"
+            ))
+            .with_source(&source.name, &source.text)
+            .with_label(
+                span.start + shift..span.end + shift,
+                "this is no `override` and no uniform of type f32",
+            )
+            .with_note(format!(
+                "declare `override {NAME}: f32 = 0.0;`, or give this another name"
+            )));
+        }
+        Ok(match form {
+            Form::Override | Form::Files => Self {
+                value: NAME.to_owned(),
+                root: NAME.to_owned(),
+                declaration: Some(format!(
+                    "// Halvings of scale on screen since the nearest view; 0, the default, is the original.\n\
+                     override {NAME}: f32 = 0.0;\n"
+                )),
+                by_override: true,
+            },
+            Form::Uniform => {
+                let (group, binding) = free_binding(module);
+                let ty = names.take("LevelOfDetail");
+                let variable = names.take("level_of_detail");
+                Self {
+                    value: format!("{variable}.{NAME}"),
+                    declaration: Some(format!(
+                        "// Halvings of scale on screen since the nearest view; 0 is the original.\n\
+                         struct {ty} {{\n    @size(16) {NAME}: f32,\n}}\n\
+                         @group({group}) @binding({binding}) var<uniform> {variable}: {ty};\n"
+                    )),
+                    root: variable,
+                    by_override: false,
+                }
+            }
+        })
+    }
+
+    /// The author's own autoLOD: a pipeline constant, or a member of something that the host fills.
+    fn own(module: &Module) -> Option<Self> {
+        let is_number =
+            |ty: naga::Handle<naga::Type>| module.types[ty].inner == TypeInner::Scalar(Scalar::F32);
+        let found = |value: String, root: &str, by_override| {
+            Some(Self {
+                value,
+                root: root.to_owned(),
+                declaration: None,
+                by_override,
+            })
+        };
+        for (_, constant) in module.overrides.iter() {
+            if constant.name.as_deref() == Some(NAME) && is_number(constant.ty) {
+                return found(NAME.to_owned(), NAME, true);
+            }
+        }
+        for (_, variable) in module.global_variables.iter() {
+            let is_uniform = match variable.space {
+                AddressSpace::Uniform | AddressSpace::Immediate => true,
+                AddressSpace::Storage { access } => access == StorageAccess::LOAD,
+                _ => false,
+            };
+            let Some(name) = variable.name.as_deref().filter(|_| is_uniform) else {
+                continue;
+            };
+            if name == NAME && is_number(variable.ty) {
+                return found(NAME.to_owned(), NAME, false);
+            }
+            if let Some(path) = member_path(module, variable.ty) {
+                return found(format!("{name}.{path}"), name, false);
+            }
+        }
+        None
+    }
+}
+
+/// The way to a member called autoLOD.
+fn member_path(module: &Module, ty: naga::Handle<naga::Type>) -> Option<String> {
+    let TypeInner::Struct { members, .. } = &module.types[ty].inner else {
+        return None;
+    };
+    members.iter().find_map(|member| {
+        let name = member.name.as_deref()?;
+        if name == NAME && module.types[member.ty].inner == TypeInner::Scalar(Scalar::F32) {
+            return Some(name.to_owned());
+        }
+        Some(format!("{name}.{}", member_path(module, member.ty)?))
+    })
+}
+
+/// The binding behind the last one of the last group.
+fn free_binding(module: &Module) -> (u32, u32) {
+    module
+        .global_variables
+        .iter()
+        .filter_map(|(_, variable)| variable.binding)
+        .map(|binding| (binding.group, binding.binding))
+        .max()
+        .map_or((0, 0), |(group, binding)| (group, binding + 1))
+}
