@@ -168,7 +168,8 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
         let mut shader = subject.shader.clone();
         let mut recipe = Recipe::default();
         for _ in 0..1 + random.below(STEPS) {
-            let candidates = recipe::candidates(&shader, &subject.facts);
+            let facts = synthetic::awkward_facts(&shader, |end| random.below(end));
+            let candidates = recipe::candidates(&shader, &facts);
             if candidates.is_empty() {
                 break;
             }
