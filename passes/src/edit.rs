@@ -4,6 +4,7 @@
 //! order with an old-to-new map, so that operands come before users and each value is computed where
 //! it is available, and brings it to normal form again.
 
+use crate::fingerprint::Declared;
 use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
 use crate::normalize::names;
@@ -221,7 +222,8 @@ impl<'a> Edit<'a> {
             first_added: base.len(),
             replaced: &self.replaced,
         };
-        let mut rebuilt = forward::rebuild(&mut self.module, old, &changes);
+        let mut declared = Declared::of(&self.module);
+        let mut rebuilt = forward::rebuild(&mut self.module, &mut declared, old, &changes);
         let mut sources: Vec<Source> = rebuilt.origins.iter().map(|o| Source::of(*o)).collect();
         let mut again = rebuilt.again;
         let mut rounds = 0;
@@ -236,6 +238,7 @@ impl<'a> Edit<'a> {
             }
             rebuilt = forward::rebuild(
                 &mut self.module,
+                &mut declared,
                 &kept.function,
                 &Changes::none(&kept.function),
             );

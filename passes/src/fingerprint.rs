@@ -308,10 +308,10 @@ pub(crate) fn of(module: &Module) -> Fingerprint {
     Fingerprint(words.bytes16())
 }
 
-/// The fingerprint of a function over the declarations of a module.
-pub(crate) fn of_function(module: &Module, function: &Function) -> Fingerprint {
+/// The fingerprint of a function over the declarations of its module.
+pub(crate) fn of_function(declared: &Declared, function: &Function) -> Fingerprint {
     let mut words = Words::new();
-    take_in(&Declared::of(module), function, &mut words);
+    take_in(declared, function, &mut words);
     Fingerprint(words.bytes16())
 }
 

@@ -15,7 +15,7 @@ pub(crate) struct Kept {
     pub(crate) origins: Vec<Handle<Expression>>,
     /// For each local variable the old one.
     pub(crate) locals: Vec<Handle<LocalVariable>>,
-    /// Whether stores or control flow were dropped.
+    /// Whether something was dropped from a loop, so that more may be known about what it stores to.
     pub(crate) again: bool,
 }
 
@@ -60,6 +60,7 @@ pub(crate) fn keep_needed(function: &Function) -> Kept {
         map: vec![None; count],
         new: Arena::new(),
         origins: Vec::with_capacity(count),
+        loops: 0,
         again: false,
     };
     let mut locals = Arena::new();
@@ -345,6 +346,8 @@ struct Compact<'a> {
     map: Vec<Option<Handle<Expression>>>,
     new: Arena<Expression>,
     origins: Vec<Handle<Expression>>,
+    /// How many loops are around what is copied.
+    loops: usize,
     again: bool,
 }
 
@@ -401,7 +404,7 @@ impl Compact<'_> {
             }
             let address: *const Statement = statement;
             if !self.kept.contains(&address) {
-                self.again = true;
+                self.again |= self.loops > 0 || matches!(statement, Statement::Loop { .. });
                 continue;
             }
             if let Some((first, last)) = run.take() {
@@ -437,11 +440,17 @@ impl Compact<'_> {
                     body,
                     continuing,
                     break_if,
-                } => Statement::Loop {
-                    body: self.block(body, needed),
-                    continuing: self.block(continuing, needed),
-                    break_if: break_if.map(|condition| self.mapped(condition)),
-                },
+                } => {
+                    self.loops += 1;
+                    let body = self.block(body, needed);
+                    let continuing = self.block(continuing, needed);
+                    self.loops -= 1;
+                    Statement::Loop {
+                        body,
+                        continuing,
+                        break_if: break_if.map(|condition| self.mapped(condition)),
+                    }
+                }
                 other => {
                     let mut copy = other.clone();
                     if let Some(result) = operands::result(other) {

@@ -16,6 +16,7 @@ use naga::{
     VectorSize,
 };
 use std::collections::{BTreeMap, HashMap};
+use std::hash::{BuildHasher, Hasher};
 
 /// Where a value of a rebuilt function comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +37,7 @@ pub(crate) struct Rebuilt {
     /// For each store of a value to a local variable: the new value, and the variable that it became
     /// known under. A variable keeps its handle.
     pub(crate) stored: Vec<(Handle<Expression>, Handle<LocalVariable>)>,
-    /// Whether control flow changed, so that another round may find more.
+    /// Whether loops changed, so that another round may find more.
     pub(crate) again: bool,
 }
 
@@ -82,6 +83,32 @@ enum Step {
     Dynamic(Handle<Expression>),
 }
 
+/// The hasher of keys that are hashes already.
+#[derive(Clone, Copy, Default)]
+struct Hashed;
+
+impl BuildHasher for Hashed {
+    type Hasher = Taken;
+    fn build_hasher(&self) -> Taken {
+        Taken(0)
+    }
+}
+
+/// A hash that was taken from the key.
+struct Taken(u64);
+
+impl Hasher for Taken {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+    fn write(&mut self, _: &[u8]) {
+        unreachable!("keys are single words");
+    }
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key;
+    }
+}
+
 /// How many steps it may take to compute a value again behind `&&`, `||` or for a select.
 const CHEAP: u32 = 12;
 
@@ -92,7 +119,7 @@ struct Forward<'a> {
     replaced: &'a BTreeMap<Handle<Expression>, Handle<Expression>>,
     /// How many of the old expressions were not added by an edit.
     first_added: usize,
-    declared: Declared,
+    declared: &'a mut Declared,
 
     new: Arena<Expression>,
     origins: Vec<Origin>,
@@ -111,7 +138,7 @@ struct Forward<'a> {
 
     map: Vec<Option<Value>>,
     mapped: Vec<Handle<Expression>>,
-    equal: HashMap<u64, Handle<Expression>>,
+    equal: HashMap<u64, Handle<Expression>, Hashed>,
     equalled: Vec<(u64, Option<Handle<Expression>>)>,
     open: Vec<u32>,
     opened: u32,
@@ -151,12 +178,17 @@ impl<'a> Changes<'a> {
     }
 }
 
-/// Rebuilds `old`, a function of `module` without calls and early returns, with changes.
+/// Rebuilds `old`, a function of `module` without calls and early returns, with changes. `declared` is of
+/// the module.
 ///
 /// # Panics
 /// When a replacement is not computed where it is used.
-pub(crate) fn rebuild(module: &mut Module, old: &Function, changes: &Changes) -> Rebuilt {
-    let declared = Declared::of(module);
+pub(crate) fn rebuild(
+    module: &mut Module,
+    declared: &mut Declared,
+    old: &Function,
+    changes: &Changes,
+) -> Rebuilt {
     let &Changes {
         expressions,
         body,
@@ -184,7 +216,7 @@ pub(crate) fn rebuild(module: &mut Module, old: &Function, changes: &Changes) ->
         fences: HashMap::new(),
         map: vec![None; count],
         mapped: Vec::new(),
-        equal: HashMap::with_capacity(count),
+        equal: HashMap::with_capacity_and_hasher(count, Hashed),
         equalled: Vec::new(),
         open: vec![0],
         opened: 0,
@@ -708,31 +740,35 @@ impl Forward<'_> {
     }
 
     fn operation(&mut self, expression: &Expression, origin: Origin) -> Value {
-        let mut values = Vec::new();
-        operands::each(expression, |operand| values.push(operand));
-        for value in &mut values {
-            *value = self.replacement(*value);
-        }
-        let mut given: Vec<Value> = values.into_iter().map(|value| self.get(value)).collect();
-        if let Some(simple) = self.simplified(expression, &given) {
+        // No expression that comes here has more operands than a texture sample.
+        let mut given = [Value::Constant(usize::MAX); 8];
+        let mut count = 0;
+        let mut constants = 0;
+        operands::each(expression, |operand| {
+            let value = self.get(operand);
+            constants += usize::from(self.as_constant(value).is_some());
+            given[count] = value;
+            count += 1;
+        });
+        let given = &mut given[..count];
+        if let Some(simple) = self.simplified(expression, given) {
             return simple;
         }
-        let foldable = Operation::of(expression).is_some() && !given.is_empty();
-        if foldable && given.iter().all(|value| self.as_constant(*value).is_some()) {
-            let constants: Vec<Constant> = given
+        if constants == count && count > 0 && Operation::of(expression).is_some() {
+            let known: Vec<Constant> = given
                 .iter()
                 .filter_map(|value| self.as_constant(*value).cloned())
                 .collect();
-            if let Some(folded) = fold::operation(expression, &constants) {
+            if let Some(folded) = fold::operation(expression, &known) {
                 return self.constant(folded, origin);
             }
             // An infinite or undefined result has no literal, and writing the operation with its
             // literals would be an error in most languages: the operand is hidden in a variable.
-            given[0] = Value::Computed(self.fence(&constants[0]));
+            given[0] = Value::Computed(self.fence(&known[0]));
         }
-        let handles: Vec<_> = given.into_iter().map(|value| self.handle(value)).collect();
-        let mut handles = handles.into_iter();
+        let mut handles = given.iter().map(|value| self.handle(*value));
         let mapped = operands::map(expression, |old| handles.next().unwrap_or(old));
+        drop(handles);
         self.compute(mapped, origin)
     }
 
@@ -1531,6 +1567,11 @@ impl Forward<'_> {
         self.targets.push(target);
     }
 
+    /// Notes that a branch was decided: a loop around it may store to fewer variables than it seemed.
+    fn folded(&mut self) {
+        self.again |= self.targets.iter().any(|target| target.is_loop);
+    }
+
     fn branch(
         &mut self,
         condition: Handle<Expression>,
@@ -1540,7 +1581,7 @@ impl Forward<'_> {
     ) -> Flow {
         let condition = self.get(condition);
         if let Some(known) = self.as_bool(condition) {
-            self.again = true;
+            self.folded();
             return self.statements(if known { accept } else { reject });
         }
         let test = self.handle(condition);
@@ -1740,7 +1781,7 @@ impl Forward<'_> {
             if let [only] = &narrowed[..] {
                 let body = match only.body.split_last() {
                     Some((Statement::Break, before)) if !breaks(before) => {
-                        self.again = true;
+                        self.folded();
                         let mut body = only.body.clone();
                         body.cull(body.len() - 1..);
                         return self.statements(&body);
@@ -1748,7 +1789,7 @@ impl Forward<'_> {
                     _ => &only.body,
                 };
                 if !breaks(body) {
-                    self.again = true;
+                    self.folded();
                     return self.statements(body);
                 }
             }

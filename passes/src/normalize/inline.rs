@@ -385,7 +385,7 @@ impl Inliner<'_> {
                      of `{name}`",
                     self.entry.name, self.limit
                 ),
-                span: out_span(self.module, self.entry),
+                span: place(self.entry),
             });
         }
         let name = function.name.as_deref().unwrap_or("call");
@@ -446,7 +446,7 @@ impl Inliner<'_> {
 }
 
 /// Where an entry point is in the source.
-fn out_span(_: &Module, entry: &EntryPoint) -> Span {
+pub(super) fn place(entry: &EntryPoint) -> Span {
     let body = entry.function.body.span_iter();
     body.map(|(_, span)| *span)
         .find(|span| span.is_defined())

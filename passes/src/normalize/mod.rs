@@ -13,7 +13,8 @@ pub(crate) mod names;
 mod returns;
 mod split;
 
-use crate::{Shader, fingerprint, live};
+use crate::fingerprint::{self, Declared};
+use crate::{Shader, live};
 use forward::{Changes, Origin};
 use naga::{Expression, Function, Module, ShaderStage, Span};
 use names::Tag;
@@ -40,9 +41,14 @@ impl std::error::Error for NormalizeError {}
 /// Rounds after which the fixed point is given up; real shaders take two to four.
 const ROUNDS: usize = 32;
 
+/// How many values there may be for each that is left in the end, before constants decide which calls
+/// are made at all.
+const ROOM: usize = 64;
+
 /// The normal form of a valid module, for a fragment entry point and perhaps a vertex entry point; the
-/// others, and what only they use, are left out. `limit` bounds how many values an entry point may have
-/// once its calls are inlined.
+/// others, and what only they use, are left out. `limit` bounds how many values an entry point may have;
+/// while its calls are inlined there may be 64 times as many, since libraries choose among their
+/// functions by constants.
 ///
 /// # Errors
 /// When there is no such entry point, or one grows beyond the limit.
@@ -80,7 +86,7 @@ pub fn normalize(
     for entry in 0..module.entry_points.len() {
         let mut point = module.entry_points[entry].clone();
         returns::remove_early(&mut module.types, &mut point.function);
-        let inlined = inline::inline(&module, &functions, &point, limit)?;
+        let inlined = inline::inline(&module, &functions, &point, limit.saturating_mul(ROOM))?;
         let path: Arc<str> = point.name.as_str().into();
         let mut tagged = Tagged {
             function: inlined.function,
@@ -88,16 +94,27 @@ pub fn normalize(
             locals: inlined.locals,
             path,
         };
+        let mut declared = Declared::of(&module);
         let mut before = None;
         for _ in 0..ROUNDS {
             tagged.split(&module);
-            tagged.forward(&mut module);
+            tagged.forward(&mut module, &mut declared);
             tagged.keep_needed();
-            let now = Some(fingerprint::of_function(&module, &tagged.function));
+            let now = Some(fingerprint::of_function(&declared, &tagged.function));
             if now == before {
                 break;
             }
             before = now;
+        }
+        let count = tagged.function.expressions.len();
+        if count > limit {
+            return Err(NormalizeError {
+                message: format!(
+                    "entry point `{}` has {count} values in normal form, more than {limit}",
+                    point.name
+                ),
+                span: inline::place(&point),
+            });
         }
         tagged.name_loads();
         module.entry_points[entry].function = tagged.function;
@@ -167,8 +184,13 @@ impl Tagged {
         self.function = split.function;
     }
 
-    fn forward(&mut self, module: &mut Module) {
-        let rebuilt = forward::rebuild(module, &self.function, &Changes::none(&self.function));
+    fn forward(&mut self, module: &mut Module, declared: &mut Declared) {
+        let rebuilt = forward::rebuild(
+            module,
+            declared,
+            &self.function,
+            &Changes::none(&self.function),
+        );
         let locals = rebuilt.function.local_variables.iter();
         self.locals = locals
             .map(|(local, variable)| match self.locals.get(local.index()) {
