@@ -9,7 +9,7 @@ mod search;
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect};
 
-use crate::emit::{self, EmitLevel, Lock, Output};
+use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
 use crate::front::{Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Shader, normalize};
@@ -30,8 +30,10 @@ pub struct Request {
     pub output: Option<PathBuf>,
     /// The entry points, where there are several.
     pub stages: Stages,
-    /// The form and the language to write.
-    pub emit: Output,
+    /// The form to write; by default that of the lock when it is replayed, else [`Form::Override`].
+    pub form: Option<Form>,
+    /// The language to write; by default that of the lock when it is replayed, else [`Target::Wgsl`].
+    pub target: Option<Target>,
     /// The command that reproduces the result, for the report.
     pub command: String,
 }
@@ -68,12 +70,20 @@ impl Request {
         self.beside("lod.toml")
     }
 
+    /// What is written: what was asked for, else what `otherwise` says.
+    fn emission(&self, otherwise: Output) -> Output {
+        Output {
+            form: self.form.unwrap_or(otherwise.form),
+            target: self.target.unwrap_or(otherwise.target),
+        }
+    }
+
     /// Emits under the name that all outputs begin with, and puts the files in their place. A single file gets the
     /// very name that was asked for.
-    fn emitted(&self, source: &Source, levels: &[EmitLevel]) -> Result<Files> {
+    fn emitted(&self, source: &Source, levels: &[EmitLevel], emission: Output) -> Result<Files> {
         let base = self.base();
         let stem = base.file_name().unwrap_or_default().to_string_lossy();
-        let files = emit::emit_as(source, levels, self.emit, &stem)?;
+        let files = emit::emit_as(source, levels, emission, &stem)?;
         let single = files.len() == 1;
         let placed = files.into_iter().map(|(name, contents)| {
             let name = name.to_string_lossy();
@@ -179,7 +189,7 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
             ),
         );
     }
-    let files = request.emitted(&source, &levels)?;
+    let files = request.emitted(&source, &levels, request.emission(lock.output))?;
     request.spare(&files, std::slice::from_ref(&request.shader))?;
     Ok((files, warnings))
 }

@@ -3,7 +3,7 @@
 mod progress;
 
 use crate::compile::{self, Request};
-use crate::emit::{self, Form, Output, Target};
+use crate::emit::{self, Form, Target};
 use crate::front::Stages;
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
@@ -58,12 +58,12 @@ struct CompileArgs {
     /// The shader to write; lock and report go beside it [default: beside the source, with .lod.wgsl]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// How the host chooses a level
-    #[arg(long, value_enum, default_value_t = Form::Override)]
-    form: Form,
-    /// The language to write
-    #[arg(long, value_enum, default_value_t = Target::Wgsl)]
-    target: Target,
+    /// How the host chooses a level [default: the lock's with --locked, else override]
+    #[arg(long, value_enum)]
+    form: Option<Form>,
+    /// The language to write [default: the lock's with --locked, else wgsl]
+    #[arg(long, value_enum)]
+    target: Option<Target>,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
@@ -127,10 +127,8 @@ fn inspect(input: InputArgs) -> Result<()> {
 fn compile_command(arguments: CompileArgs) -> Result<()> {
     let mut request = arguments.input.request();
     request.output = arguments.output;
-    request.emit = Output {
-        form: arguments.form,
-        target: arguments.target,
-    };
+    request.form = arguments.form;
+    request.target = arguments.target;
     request.command = std::iter::once("lodc".to_owned())
         .chain(std::env::args().skip(1))
         .collect::<Vec<_>>()
@@ -156,7 +154,10 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     }
     write(&compiled.files, quiet)?;
     if !quiet {
-        print(&report::next(&compiled.report, request.emit.form));
+        print(&report::next(
+            &compiled.report,
+            request.form.unwrap_or_default(),
+        ));
     }
     Ok(())
 }

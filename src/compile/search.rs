@@ -1,7 +1,7 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
 use super::{Files, Request, normal_form, relative};
-use crate::emit::{self, EmitLevel, Lock, figure};
+use crate::emit::{self, EmitLevel, Lock, Output, figure};
 use crate::eval::program::{Program, Refused};
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
@@ -80,7 +80,8 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let vertex = ready.vertex()?;
     let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     // What cannot be written should be known before a search that takes a minute.
-    let trial = request.emitted(&ready.source, &[])?;
+    let emission = request.emission(Output::default());
+    let trial = request.emitted(&ready.source, &[], emission)?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
 
@@ -99,7 +100,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .map(emit_level)
         .collect();
 
-    let mut files = request.emitted(&ready.source, &levels)?;
+    let mut files = request.emitted(&ready.source, &levels, emission)?;
     let lock = request.lock();
     files.push((
         lock.clone(),
@@ -234,7 +235,7 @@ impl Ready {
                         .map(figure),
                 })
                 .collect(),
-            output: request.emit,
+            output: request.emission(Output::default()),
             seed: self.scene.seed,
             rho0: figure(found.rho0),
             levels: found
