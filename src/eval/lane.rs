@@ -85,12 +85,13 @@ impl Mask {
         }))
     }
 
-    /// The lanes whose word is not 0, for words that are 0 or 1.
+    /// The lanes whose bool is true. A lane that does not run may hold any word where others hold a bool:
+    /// it decides about itself alone.
     pub(crate) fn from_words(words: &Words) -> Self {
         let half = |words: &[u32]| {
             let mut bits = 0;
             for (i, &word) in words.iter().enumerate() {
-                bits |= word << i;
+                bits |= (word & 1) << i;
             }
             u64::from(bits)
         };
@@ -123,6 +124,18 @@ mod tests {
         assert_eq!(Mask::from_words(&words), mask);
         assert!((0..LANES).all(|lane| mask.has(lane) == (words[lane] == 1)));
         assert_eq!(mask.count(), words.iter().sum::<u32>());
+    }
+
+    #[test]
+    fn words_that_are_no_bools_stay_with_their_lane() {
+        for lane in [0, 31, 40, 255] {
+            let mut words = [0; LANES];
+            words[lane] = u32::MAX;
+            let elsewhere = Mask::from_words(&words)
+                .lanes()
+                .find(|&other| other != lane);
+            assert_eq!(elsewhere, None, "lane {lane}");
+        }
     }
 
     #[test]

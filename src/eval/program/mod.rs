@@ -165,3 +165,53 @@ fn leaves(module: &Module, inner: &TypeInner, visit: &mut impl FnMut(ScalarKind)
         _ => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::lane::{LANES, Mask, Words};
+    use crate::eval::machine::{Bindings, Machine};
+
+    /// The register of `!c` was that of a sum before, and still is in the lanes that do not ask for `c`.
+    #[test]
+    fn a_condition_in_the_register_of_a_number() {
+        let source = "
+            var<private> asked: i32;
+            fn ask(answer: bool) -> bool { asked += 1; return answer; }
+            fn ask_early(x: f32) -> bool {
+                if x > 0.7 { asked += 10; return true; }
+                return ask(x > 0.3);
+            }
+            @fragment
+            fn fs_main(@location(0) x: f32, @location(1) y: f32) -> @location(0) vec2f {
+                let left = x > 0.5;
+                let right = y > 0.5;
+                var c = left;
+                if left || ask(right) {
+                    c = ask_early(y);
+                    if !c { asked += 100; }
+                }
+                return vec2f(f32(asked), select(0.0, 1.0, c));
+            }";
+        let module = naga::front::wgsl::parse_str(source).expect("it is valid");
+        let program = Program::compile(&module, 0, &[]).expect("it is run");
+        let place = |lane: usize| [lane % 16, lane / 16].map(|i| (i as f32 + 0.5) / 16.0);
+        let inputs: [Words; 2] =
+            [0, 1].map(|c| std::array::from_fn(|lane| place(lane)[c].to_bits()));
+        let mut outputs = [[0; LANES]; 2];
+        let bindings = Bindings::new();
+        Machine::new(&program, &bindings).run(&inputs, Mask::ALL, Mask::ALL, &mut outputs);
+        for lane in 0..LANES {
+            let [x, y] = place(lane);
+            let mut asked = if x > 0.5 { 0.0 } else { 1.0 };
+            let mut c = false;
+            if x > 0.5 || y > 0.5 {
+                c = y > 0.3;
+                asked += if y > 0.7 { 10.0 } else { 1.0 };
+                asked += if c { 0.0 } else { 100.0 };
+            }
+            let found = [0, 1].map(|i| f32::from_bits(outputs[i][lane]));
+            assert_eq!(found, [asked, f32::from(u8::from(c))], "at {x}, {y}");
+        }
+    }
+}
