@@ -4,6 +4,11 @@
 //! branch is written under the mask. Nothing traps, and lanes that do not take part are never seen, but for
 //! derivatives next to diverging lanes, which no GPU defines either.
 
+#![allow(
+    clippy::vec_box,
+    reason = "blocks change places with spare ones by their pointers, without a copy"
+)]
+
 mod kernels;
 mod textures;
 

@@ -339,7 +339,7 @@ impl Writer<'_> {
         // Which slot a value shares the register of, and for each slot when values do.
         let mut residents: Vec<Vec<Span>> = vec![Vec::new(); self.ir.slots.len()];
         let mut shared: Vec<Option<SlotId>> = vec![None; self.ir.values.len()];
-        for slot in 0..self.ir.slots.len() {
+        for (slot, resident) in residents.iter_mut().enumerate() {
             let info = self.ir.slots[slot];
             if info.len != 1 {
                 continue;
@@ -351,7 +351,7 @@ impl Writer<'_> {
                 if !written(sets, at, end) {
                     shared[value as usize] = Some(slot as SlotId);
                     survey.slots[slot].include(end);
-                    residents[slot].push(Span { start: at, end });
+                    resident.push(Span { start: at, end });
                 }
             }
         }
