@@ -1,6 +1,6 @@
 //! Lane types: what a float is while a shader runs. `f32` is what a GPU computes.
 
-use lodc_passes::semantics::Real;
+use super::machine::Kernels;
 
 /// Lanes in a block: 64 quads.
 pub const LANES: usize = 256;
@@ -9,7 +9,7 @@ pub const LANES: usize = 256;
 pub type Words = [u32; LANES];
 
 /// A number that shaders compute with. Integers and bools are words whatever it is.
-pub trait Lane: Real {
+pub trait Lane: Kernels {
     /// A block as `f32`s, which textures are read with: in `scratch`, unless it is one already.
     fn floats<'a>(block: &'a [Self; LANES], scratch: &'a mut [f32; LANES]) -> &'a [f32; LANES];
 }

@@ -3,11 +3,64 @@
 //! A result is computed in a spare block, which then changes places with the register that it is for:
 //! so an operand's register may be the result's.
 
-use super::Registers;
-use crate::eval::lane::{LANES, Lane};
+use crate::eval::lane::{LANES, Words};
 use crate::eval::program::code::Register;
 use lodc_passes::scalar_operations;
-use lodc_passes::semantics::Op;
+use lodc_passes::semantics::{Kind, Op, Real};
+
+/// The registers of a machine.
+#[derive(Debug)]
+pub struct Registers<R> {
+    pub(super) floats: Vec<Box<[R; LANES]>>,
+    pub(super) words: Vec<Box<Words>>,
+    pub(super) uniform_floats: Vec<R>,
+    pub(super) uniform_words: Vec<u32>,
+    /// Takes a result before it changes places with its register.
+    pub(super) spare_float: Box<[R; LANES]>,
+    pub(super) spare_word: Box<Words>,
+}
+
+impl<R: Real> Registers<R> {
+    /// Registers for `[varying floats, varying words, uniform floats, uniform words]`, all 0.
+    pub(super) fn new([floats, words, uniform_floats, uniform_words]: [u32; 4]) -> Self {
+        Self {
+            floats: vec![Box::new([R::default(); LANES]); floats as usize],
+            words: vec![Box::new([0; LANES]); words as usize],
+            uniform_floats: vec![R::default(); uniform_floats as usize],
+            uniform_words: vec![0; uniform_words as usize],
+            spare_float: Box::new([R::default(); LANES]),
+            spare_word: Box::new([0; LANES]),
+        }
+    }
+}
+
+/// Shows that the processor has the vectors that the loops are compiled for: AVX2 on x86-64, whatever there is
+/// elsewhere. Rust fuses no operations, so the bits do not depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Vectors(());
+
+impl Vectors {
+    /// Asks the processor.
+    pub(super) fn detect() -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return None;
+        }
+        Some(Self(()))
+    }
+}
+
+/// A type of lane that has loops.
+pub trait Kernels: Real {
+    /// Does an operation for every lane.
+    fn apply(
+        vectors: Option<Vectors>,
+        registers: &mut Registers<Self>,
+        op: Op,
+        to: Register,
+        operands: [Register; 3],
+    );
+}
 
 /// The file of varying registers of a kind.
 macro_rules! file {
@@ -135,46 +188,121 @@ macro_rules! each_lane {
     }};
 }
 
-macro_rules! dispatch {
+/// The operations without loops of their own.
+macro_rules! singly {
     ($(
         $(#[$doc:meta])*
         $name:ident($($operand:ident: $kind:ident),*) -> $result:ident,
         $simple:literal, $special:literal, $meaning:expr;
     )*) => {
-        /// Does an operation: once when its result is uniform, else for every lane.
-        #[inline(always)]
-        pub(super) fn apply<R: Lane>(
-            registers: &mut Registers<R>,
+        /// Does an operation whose operands are all uniform.
+        pub(super) fn once<R: Real>(
+            r: &mut Registers<R>,
             op: Op,
             to: Register,
             operands: [Register; 3],
         ) {
-            let r = registers;
-            if to.is_uniform() {
+            match op {
+                $(Op::$name => {
+                    let mut at = 0;
+                    $(
+                        let $operand = uniform_file!(r, $kind)[operands[at].index()];
+                        at += 1;
+                    )*
+                    let _ = at;
+                    uniform_file!(r, $result)[to.index()] = $meaning;
+                })*
+            }
+        }
+
+        /// Does an operation for every lane, one after the other.
+        fn one_by_one<R: Real>(
+            r: &mut Registers<R>,
+            op: Op,
+            to: Register,
+            operands: [Register; 3],
+        ) {
+            for i in 0..LANES {
                 match op {
                     $(Op::$name => {
                         let mut at = 0;
                         $(
-                            let $operand = uniform_file!(r, $kind)[operands[at].index()];
+                            let register = operands[at];
+                            let $operand = if register.is_uniform() {
+                                uniform_file!(r, $kind)[register.index()]
+                            } else {
+                                file!(r, $kind)[register.index()][i]
+                            };
                             at += 1;
                         )*
                         let _ = at;
-                        uniform_file!(r, $result)[to.index()] = $meaning;
+                        spare!(r, $result)[i] = $meaning;
                     })*
                 }
-                return;
             }
+            match op.signature().1 {
+                Kind::F => std::mem::swap(&mut r.spare_float, &mut r.floats[to.index()]),
+                Kind::W => std::mem::swap(&mut r.spare_word, &mut r.words[to.index()]),
+            }
+        }
+    };
+}
+scalar_operations!(singly);
+
+/// The loops for the type of lane `R`: a function for each operation, so that each is small enough for the
+/// compiler.
+macro_rules! loops {
+    ($(
+        $(#[$doc:meta])*
+        $name:ident($($operand:ident: $kind:ident),*) -> $result:ident,
+        $simple:literal, $special:literal, $meaning:expr;
+    )*) => {
+        $(
+            #[inline(never)]
+            #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2"))]
+            fn $name(r: &mut Registers<R>, to: Register, operands: [Register; 3]) {
+                each_lane!(r operands; $result, $meaning; $($operand: $kind),*);
+                std::mem::swap(&mut spare!(r, $result), &mut file!(r, $result)[to.index()]);
+            }
+        )*
+
+        #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2"))]
+        pub(super) fn apply(
+            r: &mut Registers<R>,
+            op: Op,
+            to: Register,
+            operands: [Register; 3],
+        ) {
             match op {
-                $(Op::$name => {
-                    each_lane!(r operands; $result, $meaning; $($operand: $kind),*);
-                    std::mem::swap(
-                        &mut spare!(r, $result),
-                        &mut file!(r, $result)[to.index()],
-                    );
-                })*
+                $(Op::$name => $name(r, to, operands),)*
             }
         }
     };
 }
 
-scalar_operations!(dispatch);
+#[allow(non_snake_case, reason = "functions are named after operations")]
+mod of_f32 {
+    use super::{LANES, Op, Register, Registers, scalar_operations};
+
+    type R = f32;
+    scalar_operations!(loops);
+}
+
+impl Kernels for f32 {
+    fn apply(
+        vectors: Option<Vectors>,
+        registers: &mut Registers<Self>,
+        op: Op,
+        to: Register,
+        operands: [Register; 3],
+    ) {
+        match vectors {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Vectors` are only made where `is_x86_feature_detected!` has found AVX2.
+            Some(Vectors(())) => unsafe { of_f32::apply(registers, op, to, operands) },
+            #[cfg(not(target_arch = "x86_64"))]
+            Some(Vectors(())) => of_f32::apply(registers, op, to, operands),
+            None => one_by_one(registers, op, to, operands),
+        }
+    }
+}

@@ -24,6 +24,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use textures::Scratch;
 
+pub use kernels::Kernels;
+use kernels::{Registers, Vectors};
+
 /// Rounds of all loops together that a block may take; a shader that wants more is taken to
 /// never end.
 const MAX_ROUNDS: u32 = 1 << 18;
@@ -122,18 +125,6 @@ impl Probe {
     }
 }
 
-/// The registers of a machine.
-#[derive(Debug)]
-struct Registers<R> {
-    floats: Vec<Box<[R; LANES]>>,
-    words: Vec<Box<Words>>,
-    uniform_floats: Vec<R>,
-    uniform_words: Vec<u32>,
-    /// Takes a result before it changes places with its register.
-    spare_float: Box<[R; LANES]>,
-    spare_word: Box<Words>,
-}
-
 /// A program made ready to run over the resources of one draw: buffers read, uniform values computed.
 /// `R` is what a float is while it runs.
 #[derive(Debug)]
@@ -144,8 +135,7 @@ pub struct Machine<'a, R = f32> {
     samplers: Vec<&'a Sampler>,
     registers: Registers<R>,
     scratch: Scratch,
-    /// Whether the processor has AVX2. The bits do not depend on it.
-    wide: bool,
+    vectors: Option<Vectors>,
     /// The lanes that run.
     mask: Mask,
     /// The same as words, and of which mask they are.
@@ -192,7 +182,6 @@ impl<'a, R: Lane> Machine<'a, R> {
             )
         };
         let code = &program.code;
-        let [floats, words, uniform_floats, uniform_words] = code.registers.map(|n| n as usize);
         let mut machine = Self {
             program,
             buffers: program
@@ -219,16 +208,9 @@ impl<'a, R: Lane> Machine<'a, R> {
                     _ => wrong(at, "sampler"),
                 })
                 .collect(),
-            registers: Registers {
-                floats: vec![Box::new([R::default(); LANES]); floats],
-                words: vec![Box::new([0; LANES]); words],
-                uniform_floats: vec![R::default(); uniform_floats],
-                uniform_words: vec![0; uniform_words],
-                spare_float: Box::new([R::default(); LANES]),
-                spare_word: Box::new([0; LANES]),
-            },
+            registers: Registers::new(code.registers),
             scratch: Scratch::default(),
-            wide: has_avx2(),
+            vectors: Vectors::detect(),
             mask: Mask::default(),
             mask_words: Box::new([0; LANES]),
             mask_of_words: Mask::default(),
@@ -509,31 +491,14 @@ impl<'a, R: Lane> Machine<'a, R> {
     }
 
     fn instructions(&mut self, instructions: &[Instruction]) {
-        #[cfg(target_arch = "x86_64")]
-        if self.wide {
-            // SAFETY: `wide` is what `is_x86_feature_detected!("avx2")` said of this processor.
-            unsafe { self.instructions_avx2(instructions) };
-            return;
-        }
-        self.instructions_inline(instructions);
-    }
-
-    /// The same code, compiled for wider vectors. Rust fuses no operations, so the bits are the same.
-    ///
-    /// # Safety
-    /// The processor has AVX2.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    unsafe fn instructions_avx2(&mut self, instructions: &[Instruction]) {
-        self.instructions_inline(instructions);
-    }
-
-    #[inline(always)]
-    fn instructions_inline(&mut self, instructions: &[Instruction]) {
         for instruction in instructions {
             match *instruction {
                 Instruction::Op { op, to, operands } => {
-                    kernels::apply(&mut self.registers, op, to, operands);
+                    if to.is_uniform() {
+                        kernels::once(&mut self.registers, op, to, operands);
+                    } else {
+                        R::apply(self.vectors, &mut self.registers, op, to, operands);
+                    }
                 }
                 Instruction::Copy {
                     kind,
@@ -570,7 +535,6 @@ impl<'a, R: Lane> Machine<'a, R> {
     }
 
     /// Everything that is not done lane by lane alike.
-    #[inline(never)]
     fn other(&mut self, instruction: &Instruction) {
         match instruction {
             Instruction::Op { .. } | Instruction::Copy { .. } => {}
@@ -926,17 +890,6 @@ fn set<T: Copy>(
             At::Each(index) => index[lane],
         };
         varying[place.register(index)][lane] = value;
-    }
-}
-
-fn has_avx2() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        std::arch::is_x86_feature_detected!("avx2")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        false
     }
 }
 

@@ -1,6 +1,7 @@
 //! Hands texture operations their operands as blocks of `f32`, and takes the results.
 
-use super::{Machine, Registers};
+use super::Machine;
+use super::kernels::Registers;
 use crate::eval::lane::{LANES, Lane, Mask};
 use crate::eval::program::code::{Detail, Question, Register, Sample, TexelLoad};
 use crate::eval::texture::{self, Floats, Integers, Request};

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// A register of the kind that the instruction implies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::eval) struct Register(u32);
+pub struct Register(u32);
 
 impl Register {
     const UNIFORM: u32 = 1 << 31;

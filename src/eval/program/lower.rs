@@ -119,7 +119,8 @@ struct Open {
     work: Work,
     /// Slots whose value is pending.
     pending: Vec<SlotId>,
-    /// Slots that are written in it.
+    /// Slots that are read in it, and those that are written.
+    gets: Vec<SlotId>,
     sets: Vec<SlotId>,
     /// The outermost label that it exits to.
     exits: Option<Label>,
@@ -317,6 +318,7 @@ impl<'a> Lowering<'a> {
             index: None,
             offset: 0,
         });
+        self.open.gets.push(slot);
         self.known[slot as usize].value = result;
         result
     }
@@ -402,8 +404,8 @@ impl<'a> Lowering<'a> {
         result.map(|()| inner)
     }
 
-    /// Prepares the current block for a node that holds `blocks`: pending values that they overwrite, or that
-    /// must be there when they exit past `own`, are written first.
+    /// Prepares the current block for a node that holds `blocks`: pending values that they read or overwrite,
+    /// or that must be there when they exit past `own`, are written first.
     fn before(&mut self, blocks: &[&Open], own: Label) {
         self.count();
         let exits = blocks.iter().filter_map(|b| b.exits).min();
@@ -412,12 +414,13 @@ impl<'a> Lowering<'a> {
             self.settle();
         } else {
             for block in blocks {
-                for &slot in &block.sets {
+                for &slot in block.gets.iter().chain(&block.sets) {
                     self.settle_slot(slot);
                 }
             }
         }
         for block in blocks {
+            self.open.gets.extend(&block.gets);
             for &slot in &block.sets {
                 self.known[slot as usize] = UNKNOWN;
                 self.open.sets.push(slot);
