@@ -11,7 +11,7 @@
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
 //! ```
 //!
-//! The facts are those of [`synthetic`] otherwise. `BLESS=1 cargo test --test golden` writes the golden
+//! The facts are those of [`synthetic`] otherwise. `LODC_BLESS=1 cargo test --test golden` writes the golden
 //! files anew; the `expect` line is for hands only, so that blessing carelessly fails.
 
 mod synthetic;
@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 
 #[test]
 fn passes_do_to_their_fixtures_what_the_goldens_say() {
-    let bless = std::env::var_os("BLESS").is_some();
+    let bless = std::env::var_os("LODC_BLESS").is_some();
     let mut wrong = Vec::new();
     for pass in PASSES {
         for path in fixtures(pass.name()) {
@@ -58,7 +58,7 @@ fn passes_do_to_their_fixtures_what_the_goldens_say() {
     }
     assert!(
         wrong.is_empty(),
-        "{}\nto accept the new goldens: BLESS=1 cargo test --test golden",
+        "{}\nto accept the new goldens: LODC_BLESS=1 cargo test --test golden",
         wrong.join("\n")
     );
 }

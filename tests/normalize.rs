@@ -1,7 +1,7 @@
 //! Golden files of the normal form: for each fixture under `testdata/passes/normalize/`, the
 //! full-context diff from the source to the normal form as it would be emitted.
 //!
-//! `BLESS=1 cargo test --test normalize` writes the golden files anew.
+//! `LODC_BLESS=1 cargo test --test normalize` writes the golden files anew.
 
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 #[test]
 fn normal_form_is_what_the_goldens_say() {
-    let bless = std::env::var_os("BLESS").is_some();
+    let bless = std::env::var_os("LODC_BLESS").is_some();
     let mut wrong = Vec::new();
     for path in fixtures() {
         let golden = golden(&path);
@@ -34,7 +34,7 @@ fn normal_form_is_what_the_goldens_say() {
     }
     assert!(
         wrong.is_empty(),
-        "{}\nto accept the new goldens: BLESS=1 cargo test --test normalize",
+        "{}\nto accept the new goldens: LODC_BLESS=1 cargo test --test normalize",
         wrong.join("\n")
     );
 }

@@ -201,6 +201,7 @@ mod tests {
         let mut outputs = [[0; LANES]; 2];
         let bindings = Bindings::new();
         Machine::new(&program, &bindings).run(&inputs, Mask::ALL, Mask::ALL, &mut outputs);
+        let found = |lane: usize| [0, 1].map(|i: usize| f32::from_bits(outputs[i][lane]));
         for lane in 0..LANES {
             let [x, y] = place(lane);
             let mut asked = if x > 0.5 { 0.0 } else { 1.0 };
@@ -210,8 +211,7 @@ mod tests {
                 asked += if y > 0.7 { 10.0 } else { 1.0 };
                 asked += if c { 0.0 } else { 100.0 };
             }
-            let found = [0, 1].map(|i| f32::from_bits(outputs[i][lane]));
-            assert_eq!(found, [asked, f32::from(u8::from(c))], "at {x}, {y}");
+            assert_eq!(found(lane), [asked, f32::from(u8::from(c))], "at {x}, {y}");
         }
     }
 }
