@@ -1,0 +1,260 @@
+//! Two ways to the same picture: normal form against source, the emitted shader against the original, and each
+//! level as emitted against the error that the report gives it.
+#![cfg(feature = "search")]
+
+use lodc::compile::{self, Request, normal_form};
+use lodc::eval::draw::shade;
+use lodc::eval::program::Program;
+use lodc::eval::raster::rasterize;
+use lodc::front::Source;
+use lodc::scene::Scene;
+use lodc::search::{SampleSet, Samples, Stand};
+use lodc_passes::{Shader, Stage};
+use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
+use naga::{Module, ShaderStage};
+use std::path::{Path, PathBuf};
+
+/// Every complete shader of the repository, with its scene when it has one.
+fn shaders() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found: Vec<PathBuf> = ["testdata/materials", "testdata/shaders"]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("the folder is there"))
+        .map(|entry| entry.expect("it can be listed").path())
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "wgsl")
+        })
+        .filter(|path| !path.to_string_lossy().contains(".lod"))
+        .collect();
+    found.sort();
+    found
+}
+
+/// The materials, copied beside their textures with scenes of fewer pixels and levels, so that a search is quick.
+fn small_materials() -> Vec<PathBuf> {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+    let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("differential");
+    std::fs::create_dir_all(to.join("textures")).expect("the target folder can be written");
+    let mut shaders = Vec::new();
+    for folder in ["", "textures"] {
+        for entry in std::fs::read_dir(from.join(folder)).expect("the folder is there") {
+            let path = entry.expect("it can be listed").path();
+            let Some(name) = path.file_name().filter(|_| path.is_file()) else {
+                continue;
+            };
+            let copy = to.join(folder).join(name);
+            std::fs::copy(&path, &copy).expect("it can be copied");
+            match path.extension().and_then(|extension| extension.to_str()) {
+                Some("wgsl") if !path.to_string_lossy().contains(".lod.") => shaders.push(copy),
+                Some("toml") => {
+                    let text = std::fs::read_to_string(&path).expect("a scene is text");
+                    let kept = text.lines().filter(|line| {
+                        !line.starts_with("resolution") && !line.starts_with("levels")
+                    });
+                    let text: Vec<&str> = ["resolution = [64, 64]", "levels = 3"]
+                        .into_iter()
+                        .chain(kept)
+                        .collect();
+                    std::fs::write(&copy, text.join("\n")).expect("it can be written");
+                }
+                _ => {}
+            }
+        }
+    }
+    shaders.sort();
+    shaders
+}
+
+fn read(path: &Path) -> (Source, Scene) {
+    let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
+    let file = path.with_extension("toml");
+    let scene =
+        Scene::read(&source, file.is_file().then_some(&*file)).unwrap_or_else(|e| panic!("{e}"));
+    (source, scene)
+}
+
+fn entry(module: &Module, stage: ShaderStage, name: &str) -> usize {
+    let found = module
+        .entry_points
+        .iter()
+        .position(|e| e.stage == stage && e.name == name);
+    found.expect("the entry point is there")
+}
+
+/// The vertex and fragment program of a source as it stands.
+fn programs(source: &Source, scene: &Scene) -> (Program, Program) {
+    let compile = |module: &Module, entry: usize| {
+        Program::compile(module, entry, &[])
+            .unwrap_or_else(|r| panic!("{}: {}", source.name, r.what))
+    };
+    let fragment = compile(
+        &source.module,
+        entry(&source.module, ShaderStage::Fragment, &source.fragment),
+    );
+    let vertex = match (&source.vertex, &scene.vertex_stage) {
+        (_, Some(supplied)) => compile(&supplied.module, 0),
+        (Some(name), None) => compile(
+            &source.module,
+            entry(&source.module, ShaderStage::Vertex, name),
+        ),
+        (None, None) => panic!("{}: no vertex stage", source.name),
+    };
+    (vertex, fragment)
+}
+
+/// Bits of a colour; all NaNs are one.
+fn bits(colour: [f32; 4]) -> [u32; 4] {
+    colour.map(|c| {
+        if c.is_nan() {
+            f32::NAN.to_bits()
+        } else {
+            c.to_bits()
+        }
+    })
+}
+
+/// Draws two pairs of programs at every distance of the scene and compares fragment by fragment.
+fn assert_same(name: &str, scene: &Scene, a: &(Program, Program), b: &(Program, Program)) {
+    for distance in [
+        scene.distances[0],
+        scene.distances[scene.distances.len() / 2],
+    ] {
+        for frame in scene.frames(distance) {
+            let (left, right) = (rasterize(&a.0, &a.1, &frame), rasterize(&b.0, &b.1, &frame));
+            assert!(
+                left.pixels().eq(right.pixels()),
+                "{name}: other pixels at {distance}"
+            );
+            let (left, right) = (
+                shade(&a.1, &left, &frame.bindings),
+                shade(&b.1, &right, &frame.bindings),
+            );
+            assert_eq!(
+                left.alive, right.alive,
+                "{name}: other fragments discarded at {distance}"
+            );
+            assert!(
+                !left.colours.is_empty(),
+                "{name}: nothing to see at {distance}"
+            );
+            for (i, (l, r)) in left.colours.iter().zip(&right.colours).enumerate() {
+                if left.alive[i] {
+                    assert_eq!(
+                        bits(*l),
+                        bits(*r),
+                        "{name}: fragment {i} at {distance}: {l:?} {r:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn program(shader: &Shader, stage: Stage) -> Option<Program> {
+    let index = shader.index(stage)?;
+    Some(Program::compile(shader.module(), index, &[]).unwrap_or_else(|r| panic!("{}", r.what)))
+}
+
+#[test]
+fn normal_form_draws_what_the_source_draws() {
+    for path in shaders() {
+        let (source, scene) = read(&path);
+        let written = programs(&source, &scene);
+        let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+        let vertex = program(&base, Stage::Vertex);
+        let fragment = program(&base, Stage::Fragment).expect("a shader has a fragment stage");
+        let normal = match vertex {
+            Some(vertex) => (vertex, fragment),
+            None => (programs(&source, &scene).0, fragment),
+        };
+        assert_same(&source.name, &scene, &written, &normal);
+    }
+}
+
+/// The emitted shader as a host runs it, with `autoLOD` set, or not.
+fn specialised(emitted: &Source, autolod: Option<f64>) -> Source {
+    let constants: PipelineConstants = autolod
+        .iter()
+        .map(|value| ("autoLOD".to_owned(), *value))
+        .collect();
+    let (module, info) = process_overrides(&emitted.module, &emitted.info, None, &constants)
+        .expect("overrides resolve");
+    Source {
+        module: module.into_owned(),
+        info: info.into_owned(),
+        ..emitted.clone()
+    }
+}
+
+#[test]
+fn emitted_levels_have_the_errors_that_are_reported() {
+    for path in small_materials() {
+        let (source, scene) = read(&path);
+        let request = Request {
+            shader: path.clone(),
+            ..Request::default()
+        };
+        let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+        let (name, text) = &compiled.files[0];
+        let text = String::from_utf8(text.clone()).expect("WGSL is text");
+        let emitted =
+            Source::parse(&name.display().to_string(), text).unwrap_or_else(|e| panic!("{e}"));
+
+        let original = programs(&source, &scene);
+        for unset in [None, Some(0.0), Some(-1.0)] {
+            let level = specialised(&emitted, unset);
+            assert_same(&source.name, &scene, &original, &programs(&level, &scene));
+        }
+
+        let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+        let stand = Stand {
+            base: &base,
+            vertex: &original.0,
+            scene: &scene,
+        };
+        for level in compiled.report.levels.iter().skip(1) {
+            // A threshold is an f32 in the shader.
+            let shader = specialised(&emitted, Some(f64::from(level.autolod as f32)));
+            let set = SampleSet::new(&stand, level.distance, Samples::Full)
+                .unwrap_or_else(|r| panic!("{}", r.what));
+            let measured = set.measure_program(&programs(&shader, &scene).1);
+            let rmse = measured.error.square().sqrt();
+            assert!(
+                (rmse - level.error.rmse).abs() <= 1e-6,
+                "{}: level at {}: reported {}, found {rmse}",
+                source.name,
+                level.autolod,
+                level.error.rmse
+            );
+        }
+    }
+}
+
+#[test]
+fn the_same_bytes_come_from_any_number_of_threads() {
+    let path = small_materials()
+        .into_iter()
+        .find(|path| path.ends_with("terrain_blend.wgsl"))
+        .expect("it is there");
+    let request = Request {
+        shader: path,
+        ..Request::default()
+    };
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads can be made");
+        pool.install(|| {
+            compile::compile(&request, &|_| {})
+                .unwrap_or_else(|e| panic!("{e}"))
+                .files
+        })
+    };
+    let once = on(1);
+    assert!(once.len() >= 3, "shader, lock and report");
+    for threads in [1, 2] {
+        assert!(on(threads) == once, "other bytes from {threads} threads");
+    }
+}
