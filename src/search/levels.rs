@@ -211,7 +211,7 @@ impl<'a> Check<'a> {
 /// The cheapest member that every check passes. Error falls as cost rises along a frontier, so the place is
 /// found by bisection, and then confirmed upwards.
 fn cheapest_confirmed(stand: &Stand<'_>, members: &[&Seen], checks: &[Check<'_>]) -> Option<Level> {
-    let judge = |member: &Seen| -> Option<Level> {
+    let judge = |member: &Seen| -> Option<Measured> {
         let shader = member.recipe.replay(stand.base).ok()?;
         shader.validate().ok()?;
         let mut first = None;
@@ -222,32 +222,49 @@ fn cheapest_confirmed(stand: &Stand<'_>, members: &[&Seen], checks: &[Check<'_>]
             }
             first.get_or_insert(measured);
         }
-        let (start, measured) = (&checks[0], first?);
-        let distance = start.set.distance();
-        Some(Level {
-            autolod: threshold(stand.scene, distance),
-            distance,
-            recipe: member.recipe.clone(),
-            error: ErrorFigures::new(&measured.error, &start.set.original().error, start.bound),
-            work: measured.work,
-            cost: measured.work.total() / start.set.original().work.total(),
-            error_after: error_after(stand, &member.recipe, &start.set),
-            shader,
-        })
+        first
     };
     let (mut low, mut high) = (0, members.len());
     let mut best = None;
     while low < high {
         let middle = low + (high - low) / 2;
         match judge(members[middle]) {
-            Some(level) => {
-                best = Some(level);
+            Some(measured) => {
+                best = Some((members[middle], measured));
                 high = middle;
             }
             None => low = middle + 1,
         }
     }
-    best
+    let (member, measured) = best?;
+    let start = &checks[0];
+    let distance = start.set.distance();
+    let recipe = minimal(stand.base, &member.recipe);
+    Some(Level {
+        autolod: threshold(stand.scene, distance),
+        distance,
+        shader: recipe.replay(stand.base).ok()?,
+        error: ErrorFigures::new(&measured.error, &start.set.original().error, start.bound),
+        work: measured.work,
+        cost: measured.work.total() / start.set.original().work.total(),
+        error_after: error_after(stand, &recipe, &start.set),
+        recipe,
+    })
+}
+
+/// A recipe without the steps that later ones have made pointless: the same shader, with less to replay and to say.
+fn minimal(base: &Shader, recipe: &Recipe) -> Recipe {
+    let identity = |recipe: &Recipe| Some(recipe.replay(base).ok()?.fingerprint());
+    let goal = identity(recipe);
+    let mut kept = recipe.clone();
+    for at in (0..recipe.0.len()).rev() {
+        let mut fewer = kept.clone();
+        fewer.0.remove(at);
+        if goal.is_some() && identity(&fewer) == goal {
+            kept = fewer;
+        }
+    }
+    kept
 }
 
 /// The RMSE after each step of a recipe.
