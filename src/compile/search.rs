@@ -156,6 +156,12 @@ impl Ready {
             .chain(textures)
     }
 
+    /// The hash of a file as it was when the scene read it: that is what was measured, whatever the file holds by now.
+    fn hash_of(&self, name: &str) -> String {
+        let read = self.scene.inputs.iter().find(|input| input.name == name);
+        read.map_or_else(String::new, |input| input.hash.clone())
+    }
+
     /// The files of a texture; the scene names them from its own folder.
     fn texture_files<'a>(
         &'a self,
@@ -226,11 +232,14 @@ impl Ready {
                 .textures
                 .iter()
                 .filter(|texture| averaged.contains(&texture.name))
-                .flat_map(|texture| self.texture_files(texture).map(move |file| (texture, file)))
-                .map(|(texture, file)| emit::LockedTexture {
+                .flat_map(|texture| {
+                    let places = self.texture_files(texture).zip(&texture.files);
+                    places.map(move |(file, name)| (texture, file, name))
+                })
+                .map(|(texture, file, name)| emit::LockedTexture {
                     name: texture.name.clone(),
                     file: relative(folder, &file),
-                    hash: emit::hash(&std::fs::read(&file).unwrap_or_default()),
+                    hash: self.hash_of(name),
                     texels_per_pixel: texels_per_pixel(&self.scene, texture, self.scene.nearest)
                         .map(figure),
                 })
