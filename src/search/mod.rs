@@ -10,14 +10,15 @@
 //! It knows nothing of the command line or of reports.
 
 pub mod error;
+mod facts;
 pub mod frontier;
 mod greedy;
 pub mod levels;
 pub mod samples;
 
 pub use error::{ErrorFigures, ErrorSum};
+pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
 pub use levels::{AtDistance, Found, Level, Progress, find};
-pub(crate) use samples::texels_per_pixel;
 pub use samples::{Measured, SampleSet, Samples, Stand};

@@ -6,14 +6,11 @@ use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::machine::Bindings;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::{Coverage, rasterize};
-use crate::eval::texture::Dimension;
-use crate::scene::{Output, Scene, SceneTexture};
-use glam::{Vec2, Vec3};
-use lodc_passes::facts::{TextureFacts, ValueFacts};
-use lodc_passes::{Facts, Shader, Stage, Work, autolod};
-use naga::{Expression, Handle, Scalar, TypeInner};
+use crate::scene::{Output, Scene};
+use lodc_passes::{Shader, Stage, Work};
+use naga::{Expression, Handle};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Fine pixels of the reference to a pixel, along each axis.
 const GRID: u32 = 4;
@@ -50,18 +47,18 @@ pub struct Measured {
 
 /// The samples at one distance.
 pub struct SampleSet<'a> {
-    stand: &'a Stand<'a>,
+    pub(super) stand: &'a Stand<'a>,
     distance: f64,
-    frames: Vec<Rasterised>,
+    pub(super) frames: Vec<Rasterised>,
     original: Measured,
 }
 
 /// One frame, rasterised, with the reference's pixels.
-struct Rasterised {
-    bindings: Bindings,
-    coverage: Coverage,
+pub(super) struct Rasterised {
+    pub(super) bindings: Bindings,
+    pub(super) coverage: Coverage,
     /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
-    seen: Option<Coverage>,
+    pub(super) seen: Option<Coverage>,
     /// The pixels that the reference or a fragment covers.
     reference: Vec<ReferencePixel>,
     /// For each covered fragment, its place in `reference`.
@@ -157,65 +154,6 @@ impl<'a> SampleSet<'a> {
             work: work * (1.0 / lanes.max(1) as f64),
         }
     }
-
-    /// What the samples show of every float value of a shader, and of the scene's textures.
-    pub fn facts(&self, shader: &Shader) -> Facts {
-        let mut facts = Facts {
-            values: BTreeMap::new(),
-            textures: texture_facts(self.stand.scene, self.distance),
-        };
-        let probes = float_values(shader);
-        let Ok(program) = compile(shader, &probes) else {
-            return facts;
-        };
-        let profiles: Vec<_> = self
-            .frames
-            .par_iter()
-            .map(|frame| {
-                let mut shading = Shading::default();
-                let seen = frame.seen.as_ref().unwrap_or(&frame.coverage);
-                shade_into(&program, seen, &frame.bindings, &mut shading);
-                shading.profile.probes
-            })
-            .collect();
-        for (i, value) in probes.iter().enumerate() {
-            let mut fact = ValueFacts::default();
-            let components = profiles
-                .iter()
-                .map(|frame| frame[i].len())
-                .max()
-                .unwrap_or(0);
-            for component in 0..components {
-                let (mut count, mut sum) = (0, 0.0);
-                let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
-                for probe in profiles.iter().filter_map(|frame| frame[i].get(component)) {
-                    count += probe.count;
-                    sum += probe.sum;
-                    // A NaN stays: it must be seen.
-                    min = if min.is_nan() || probe.min > min {
-                        min
-                    } else {
-                        probe.min
-                    };
-                    max = if max.is_nan() || probe.max < max {
-                        max
-                    } else {
-                        probe.max
-                    };
-                }
-                fact.count = count;
-                fact.mean.push((sum / count.max(1) as f64) as f32);
-                fact.min.push(min);
-                fact.max.push(max);
-            }
-            if fact.count > 0 {
-                facts
-                    .values
-                    .insert(shader.id(Stage::Fragment, *value).clone(), fact);
-            }
-        }
-        facts
-    }
 }
 
 impl Rasterised {
@@ -293,82 +231,10 @@ impl Rasterised {
     }
 }
 
-/// What is known of every texture that is not dynamic, at the MIP level that a distance leads to.
-fn texture_facts(scene: &Scene, distance: f64) -> BTreeMap<String, TextureFacts> {
-    let known = scene.textures.iter().filter(|texture| !texture.dynamic);
-    known
-        .map(|texture| {
-            let level = texels_per_pixel(scene, texture, distance)
-                .unwrap_or(1.0)
-                .log2();
-            (
-                texture.name.clone(),
-                texture.texture.facts(level.max(0.0) as f32),
-            )
-        })
-        .collect()
-}
-
-/// Texels of a texture to a pixel at a distance, along an edge, when it is mapped by the mesh's own texture
-/// coordinates: the mean over the mesh's area. `None` for a texture or a mesh that has no such coordinates.
-pub(crate) fn texels_per_pixel(
-    scene: &Scene,
-    texture: &SceneTexture,
-    distance: f64,
-) -> Option<f64> {
-    let mesh = &scene.mesh;
-    if texture.texture.dimension() != Dimension::D2 || mesh.uvs.is_empty() {
-        return None;
-    }
-    let (mut surface, mut mapped) = (0.0, 0.0);
-    for corners in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|i| corners[i] as usize);
-        let position = |i: usize| Vec3::from(mesh.positions[i]).as_dvec3();
-        let uv = |i: usize| Vec2::from(mesh.uvs[i]).as_dvec2();
-        surface += (position(b) - position(a))
-            .cross(position(c) - position(a))
-            .length();
-        mapped += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
-    }
-    let [width, height, _] = texture.texture.size(0);
-    let texels = mapped * f64::from(width) * f64::from(height);
-    let scale = (texels / surface).sqrt() / autolod::rho(&scene.view(distance));
-    (scale.is_finite() && scale > 0.0).then_some(scale)
-}
-
-fn compile(shader: &Shader, probes: &[Handle<Expression>]) -> Result<Program, Refused> {
+pub(super) fn compile(shader: &Shader, probes: &[Handle<Expression>]) -> Result<Program, Refused> {
     // A shader always has a fragment stage.
     let entry = shader.index(Stage::Fragment).unwrap_or(0);
     Program::compile(shader.module(), entry, probes)
-}
-
-/// The fragment values that facts are wanted of: f32 scalars, vectors and matrices that are computed.
-fn float_values(shader: &Shader) -> Vec<Handle<Expression>> {
-    let Some(function) = shader.function(Stage::Fragment) else {
-        return Vec::new();
-    };
-    function
-        .expressions
-        .iter()
-        .filter(|(_, expression)| {
-            !expression.needs_pre_emit() || matches!(expression, Expression::FunctionArgument(_))
-        })
-        .map(|(value, _)| value)
-        .filter(|value| {
-            matches!(
-                shader.type_of(Stage::Fragment, *value),
-                TypeInner::Scalar(Scalar::F32)
-                    | TypeInner::Vector {
-                        scalar: Scalar::F32,
-                        ..
-                    }
-                    | TypeInner::Matrix {
-                        scalar: Scalar::F32,
-                        ..
-                    }
-            )
-        })
-        .collect()
 }
 
 /// Some of the squares, `count` of them, spread evenly: sorted by a hash of their place and the seed.
