@@ -68,7 +68,8 @@ pub fn shade_into(
         &mut shading.alive[..],
         &mut shading.depths[..],
     );
-    for blocks in coverage.blocks.chunks(BLOCKS_PER_MACHINE) {
+    let draws = coverage.blocks.chunk_by(|a, b| a.draw == b.draw);
+    for blocks in draws.flat_map(|blocks| blocks.chunks(BLOCKS_PER_MACHINE)) {
         let count = blocks.iter().map(Block::covered_count).sum();
         jobs.push(Job {
             blocks,
@@ -239,7 +240,7 @@ impl Interface {
     }
 }
 
-/// The blocks of one machine, and where their results go.
+/// The blocks of one machine, all of one draw, and where their results go.
 struct Job<'a> {
     blocks: &'a [Block],
     colours: &'a mut [[f32; 4]],
@@ -249,7 +250,8 @@ struct Job<'a> {
 
 impl Job<'_> {
     fn run(self, program: &Program, bindings: &Bindings, interface: &Interface) -> Profile {
-        let mut machine = Machine::new(program, bindings);
+        let draw = self.blocks.first().map_or(0, |block| block.draw);
+        let mut machine = Machine::of_draw(program, bindings, draw);
         let mut outputs = vec![[0; LANES]; interface.outputs];
         let mut chosen: Vec<Words> = match &interface.inputs {
             Some(inputs) => vec![[0; LANES]; inputs.len()],

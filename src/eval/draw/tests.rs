@@ -18,6 +18,7 @@ fn coverage(depths: [f32; 3]) -> Coverage {
         covered: Mask([0b1_0011, 0, 0, 0]),
         pixels: [u32::MAX; LANES],
         depths: [0.0; LANES],
+        draw: 0,
         first: 0,
     };
     for ((lane, pixel), depth) in [(0, 0), (1, 1), (4, 0)].into_iter().zip(depths) {
@@ -198,6 +199,59 @@ fn a_textured_square_shows_its_image() {
         }
     }
     assert_eq!((profile.lanes, profile.work.samples), (64, 64.0));
+}
+
+#[test]
+fn draws_share_the_depth_and_have_their_own_resources() {
+    let mut mesh = square(1.0, 1.0);
+    let second = square(1.0, 1.0);
+    mesh.positions.extend(second.positions);
+    mesh.uvs.extend(second.uvs);
+    mesh.indices.extend([4, 5, 6, 4, 6, 7]);
+    mesh.draws = [0..4, 4..8]
+        .into_iter()
+        .map(|vertices| crate::scene::mesh::Draw {
+            triangles: vertices.start / 2..vertices.end / 2,
+            vertices,
+        })
+        .collect();
+    let mut frame = frame(mesh, 8, image(1, |_, _| [0.0; 4]));
+    let picture_of = |colour: [f32; 4]| {
+        let image = image(1, |_, _| colour);
+        Resource::Texture(Arc::new(Texture::new(Dimension::D2, vec![image]).unwrap()))
+    };
+    let scale = |x: f32| {
+        let bytes = [x, 1.0, 0.0, 0.0].map(f32::to_le_bytes);
+        Resource::Buffer(Arc::new(bytes.as_flattened().to_vec()))
+    };
+    // The first is drawn half as wide, in red, and hides the second, which is as near.
+    let (red, blue) = ([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]);
+    frame.bindings.insert(
+        (0, 0),
+        Resource::PerDraw(Arc::new([scale(0.5), scale(1.0)])),
+    );
+    frame.bindings.insert(
+        (0, 1),
+        Resource::PerDraw(Arc::new([picture_of(red), picture_of(blue)])),
+    );
+    let vertex = program("vertex");
+    let (picture, profile) = draw(&vertex, &program("textured"), &frame);
+    for (i, pixel) in picture.pixels.iter().enumerate() {
+        let inside = (2..6).contains(&(i % 8));
+        assert_eq!(*pixel, if inside { red } else { blue }, "pixel {i}");
+    }
+    assert_eq!(profile.lanes, 64);
+    // Vertices are counted from the start of each draw, and blocks are of one draw each, in a part too.
+    let coverage = rasterize(&vertex, &program("lattice"), &frame);
+    let shading = shade(&program("lattice"), &coverage, &frame.bindings);
+    assert!(shading.colours.iter().all(|colour| colour[3] == 0.0));
+    let draws = |coverage: &Coverage| -> Vec<(usize, usize)> {
+        let blocks = coverage.blocks.iter();
+        blocks.map(|b| (b.draw, b.covered_count())).collect()
+    };
+    assert_eq!(draws(&coverage), [(0, 32), (1, 64)]);
+    let top = coverage.part(|(_, y)| y < 2);
+    assert_eq!(draws(&top), [(0, 16), (1, 32)]);
 }
 
 #[test]

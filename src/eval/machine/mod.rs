@@ -40,9 +40,21 @@ pub enum Resource {
     Texture(Arc<Texture>),
     /// A sampler.
     Sampler(Arc<Sampler>),
+    /// Another one of the above for each draw of a mesh; a draw beyond the last takes the last.
+    PerDraw(Arc<[Resource]>),
 }
 
-/// The resources of a draw, by group and binding.
+impl Resource {
+    /// What a draw sees; nothing when there is none.
+    pub fn of_draw(&self, draw: usize) -> Option<&Self> {
+        match self {
+            Self::PerDraw(all) => all.get(draw).or(all.last()),
+            one => Some(one),
+        }
+    }
+}
+
+/// The resources of a mesh's draws, by group and binding.
 pub type Bindings = BTreeMap<(u32, u32), Resource>;
 
 /// What a run of a program showed besides its results.
@@ -161,7 +173,15 @@ impl<'a> Machine<'a> {
     /// # Panics
     /// When a resource that the program uses is not bound, or is of another kind: the scene sees to that.
     pub fn new(program: &'a Program, bindings: &'a Bindings) -> Self {
-        Self::of_lanes(program, bindings)
+        Self::of_lanes(program, bindings, 0)
+    }
+
+    /// The same for one of several draws.
+    ///
+    /// # Panics
+    /// As [`Machine::new`].
+    pub fn of_draw(program: &'a Program, bindings: &'a Bindings, draw: usize) -> Self {
+        Self::of_lanes(program, bindings, draw)
     }
 }
 
@@ -170,8 +190,11 @@ impl<'a, R: Lane> Machine<'a, R> {
     ///
     /// # Panics
     /// As [`Machine::new`].
-    pub fn of_lanes(program: &'a Program, bindings: &'a Bindings) -> Self {
-        let find = |&(group, binding): &(u32, u32)| match bindings.get(&(group, binding)) {
+    pub fn of_lanes(program: &'a Program, bindings: &'a Bindings, draw: usize) -> Self {
+        let find = |&(group, binding): &(u32, u32)| match bindings
+            .get(&(group, binding))
+            .and_then(|resource| resource.of_draw(draw))
+        {
             Some(resource) => resource,
             None => panic!("nothing is bound at group {group}, binding {binding}"),
         };

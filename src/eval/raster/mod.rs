@@ -38,6 +38,8 @@ pub enum Attribute {
     Normal,
     /// Texture coordinates.
     Uv,
+    /// The second set of texture coordinates; where the mesh has none, the first.
+    SecondUv,
     /// Tangent, with the sign of the bitangent in w.
     Tangent,
     /// The bitangent: the normal times the tangent, with its sign.
@@ -79,7 +81,7 @@ pub struct Coverage {
     pub height: u32,
     /// Fine pixels to a pixel, along each axis.
     pub grid: u32,
-    /// The fragments, 64 quads a block; they all are full but the last.
+    /// The fragments, 64 quads a block, draw by draw; they all are full but the last of each draw.
     pub blocks: Vec<Block>,
     /// How many fragments are covered, in all blocks.
     pub fragments: usize,
@@ -106,6 +108,8 @@ pub struct Block {
     pub pixels: Words,
     /// The depth of each active lane, 0..1 where covered.
     pub depths: [f32; LANES],
+    /// Which of the mesh's draws it is of.
+    pub draw: usize,
     /// The place of the first covered fragment among all of [`Coverage::fragments`].
     pub first: usize,
 }
@@ -127,34 +131,41 @@ pub fn rasterize(vertex: &Program, fragment: &Program, frame: &Frame) -> Coverag
         vertices,
         vertex.outputs(),
         fragment.inputs(),
-        &frame.mesh.indices,
+        &frame.mesh,
         &Target::of(frame),
         late,
     )
 }
 
-/// The fragments of triangles whose vertices have been shaded.
+/// The fragments of a mesh's triangles whose vertices have been shaded.
 fn cover(
     vertices: vertices::Vertices,
     outputs: &[Slot],
     inputs: &[Slot],
-    indices: &[u32],
+    mesh: &Mesh,
     target: &Target,
     late: bool,
 ) -> Coverage {
-    let triangles: Vec<_> = indices
-        .chunks_exact(3)
-        .enumerate()
-        .filter_map(|(i, corners)| {
+    let mut triangles = Vec::new();
+    // Where the triangles of each draw end.
+    let mut ends = Vec::new();
+    for draw in mesh.draws() {
+        let indices = mesh
+            .indices
+            .get(3 * draw.triangles.start..3 * draw.triangles.end);
+        let corners = indices.unwrap_or_default().chunks_exact(3).enumerate();
+        triangles.extend(corners.filter_map(|(i, corners)| {
             let corners = [corners[0], corners[1], corners[2]];
             triangle::Triangle::new(i as u32, corners, &vertices.positions, target)
-        })
-        .collect();
+        }));
+        ends.push(triangles.len());
+    }
     let quads = if late {
         quads::in_order(&triangles)
     } else {
         quads::visible(&triangles, target)
     };
+    let quads = quads::by_draw(quads, &ends);
     let blocks = quads::blocks(&quads, &triangles, &vertices, outputs, inputs, target);
     let fragments = blocks.last().map_or(0, |b| b.first + b.covered_count());
     Coverage {

@@ -1,4 +1,4 @@
-//! A part of a coverage: the fragments of some screen quads, packed into full blocks again.
+//! A part of a coverage: the fragments of some screen quads, packed into full blocks again, draw by draw.
 
 use super::{Block, Coverage};
 use crate::eval::lane::{LANES, Mask};
@@ -41,6 +41,9 @@ impl Coverage {
                 if !keep(self.square(block.pixels[lane])) {
                     continue;
                 }
+                if filling.as_ref().is_some_and(|(b, _)| b.draw != block.draw) {
+                    blocks.extend(filling.take().map(|(block, _)| block));
+                }
                 let (target, at) = filling.get_or_insert_with(|| {
                     let empty = Block {
                         inputs: vec![[0; LANES]; block.inputs.len()],
@@ -48,6 +51,7 @@ impl Coverage {
                         covered: Mask::default(),
                         pixels: [u32::MAX; LANES],
                         depths: [0.0; LANES],
+                        draw: block.draw,
                         first: fragments,
                     };
                     (empty, 0)

@@ -88,9 +88,24 @@ pub(super) fn in_order(triangles: &[Triangle]) -> Vec<Quad> {
     quads
 }
 
-/// Packs quads into blocks and computes the inputs of the fragment program.
+/// The quads of each draw, in the order in which they are. `ends` says where the triangles of each draw end.
+pub(super) fn by_draw(quads: Vec<Quad>, ends: &[usize]) -> Vec<Vec<Quad>> {
+    if ends.len() == 1 {
+        return vec![quads];
+    }
+    let mut draws: Vec<Vec<Quad>> = ends.iter().map(|_| Vec::new()).collect();
+    for quad in quads {
+        let draw = ends.partition_point(|end| *end <= quad.triangle as usize);
+        if let Some(draw) = draws.get_mut(draw) {
+            draw.push(quad);
+        }
+    }
+    draws
+}
+
+/// Packs the quads of each draw into blocks and computes the inputs of the fragment program.
 pub(super) fn blocks(
-    quads: &[Quad],
+    draws: &[Vec<Quad>],
     triangles: &[Triangle],
     vertices: &Vertices,
     outputs: &[Slot],
@@ -98,9 +113,16 @@ pub(super) fn blocks(
     target: &Target,
 ) -> Vec<Block> {
     let sources: Vec<Source> = inputs.iter().map(|s| Source::of(s, outputs)).collect();
-    let mut blocks: Vec<Block> = quads
-        .par_chunks(LANES / 4)
-        .map(|quads| block(quads, triangles, vertices, &sources, target))
+    let mut blocks: Vec<Block> = draws
+        .par_iter()
+        .enumerate()
+        .flat_map(|(draw, quads)| {
+            let blocks = quads.par_chunks(LANES / 4);
+            blocks.map({
+                let sources = &sources;
+                move |quads| block(quads, draw, triangles, vertices, sources, target)
+            })
+        })
         .collect();
     let mut first = 0;
     for block in &mut blocks {
@@ -112,6 +134,7 @@ pub(super) fn blocks(
 
 fn block(
     quads: &[Quad],
+    draw: usize,
     triangles: &[Triangle],
     vertices: &Vertices,
     sources: &[Source],
@@ -123,6 +146,7 @@ fn block(
         covered: Mask::default(),
         pixels: [u32::MAX; LANES],
         depths: [0.0; LANES],
+        draw,
         first: 0,
     };
     let linear = sources

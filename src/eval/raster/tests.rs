@@ -5,6 +5,7 @@ use super::{Block, Coverage, Target, cover};
 use crate::eval::lane::LANES;
 use crate::eval::machine::Profile;
 use crate::eval::program::Slot;
+use crate::scene::mesh::Mesh;
 use naga::{Binding, BuiltIn, Interpolation, ScalarKind};
 use std::collections::BTreeMap;
 
@@ -83,7 +84,11 @@ impl Case {
             vertices,
             &outputs,
             inputs,
-            &self.indices,
+            &Mesh {
+                positions: vec![[0.0; 3]; self.positions.len()],
+                indices: self.indices.clone(),
+                ..Mesh::default()
+            },
             &target,
             self.late,
         )

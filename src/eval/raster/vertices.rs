@@ -22,18 +22,25 @@ pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
     let mesh = &*frame.mesh;
     let count = mesh.positions.len();
     let mut outputs = vec![Vec::with_capacity(count); program.outputs().len()];
-    let mut machine = Machine::new(program, &frame.bindings);
+    let mut profile: Option<Profile> = None;
     let mut inputs = vec![[0; LANES]; program.inputs().len()];
     let mut block = vec![[0; LANES]; program.outputs().len()];
-    for first in (0..count).step_by(LANES) {
-        let lanes = (count - first).min(LANES);
-        for (words, slot) in inputs.iter_mut().zip(program.inputs()) {
-            feed(words, slot, first, lanes, mesh, frame);
+    for (index, draw) in mesh.draws().into_iter().enumerate() {
+        let mut machine = Machine::of_draw(program, &frame.bindings, index);
+        for first in draw.vertices.clone().step_by(LANES) {
+            let lanes = (draw.vertices.end - first).min(LANES);
+            for (words, slot) in inputs.iter_mut().zip(program.inputs()) {
+                feed(words, slot, (first, draw.vertices.start), lanes, frame);
+            }
+            let active = first_lanes(lanes);
+            machine.run(&inputs, active, active, &mut block);
+            for (all, words) in outputs.iter_mut().zip(&block) {
+                all.extend_from_slice(&words[..lanes]);
+            }
         }
-        let active = first_lanes(lanes);
-        machine.run(&inputs, active, active, &mut block);
-        for (all, words) in outputs.iter_mut().zip(&block) {
-            all.extend_from_slice(&words[..lanes]);
+        match &mut profile {
+            None => profile = Some(machine.profile()),
+            Some(profile) => profile.absorb(&machine.profile()),
         }
     }
     let mut positions = vec![[f32::NAN; 4]; count];
@@ -47,16 +54,23 @@ pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
     Vertices {
         positions,
         outputs,
-        profile: machine.profile(),
+        profile: profile.unwrap_or_default(),
     }
 }
 
-/// Fills one input for the vertices from `first`.
-fn feed(words: &mut Words, slot: &Slot, first: usize, lanes: usize, mesh: &Mesh, frame: &Frame) {
+/// Fills one input for the vertices from `first`, of a draw that begins at `start`.
+fn feed(
+    words: &mut Words,
+    slot: &Slot,
+    (first, start): (usize, usize),
+    lanes: usize,
+    frame: &Frame,
+) {
+    let mesh = &*frame.mesh;
     let attribute = match slot.binding {
         Binding::BuiltIn(BuiltIn::VertexIndex) => {
             for (lane, word) in words[..lanes].iter_mut().enumerate() {
-                *word = (first + lane) as u32;
+                *word = (first - start + lane) as u32;
             }
             return;
         }
@@ -89,7 +103,10 @@ fn component(mesh: &Mesh, attribute: Attribute, vertex: usize, component: usize)
     match attribute {
         Attribute::Position => three(&mesh.positions),
         Attribute::Normal => three(&mesh.normals),
-        Attribute::Uv => mesh.uvs.get(vertex)?.get(component).copied(),
+        Attribute::SecondUv if !mesh.second_uvs.is_empty() => {
+            mesh.second_uvs.get(vertex)?.get(component).copied()
+        }
+        Attribute::Uv | Attribute::SecondUv => mesh.uvs.get(vertex)?.get(component).copied(),
         Attribute::Tangent => mesh.tangents.get(vertex)?.get(component).copied(),
         Attribute::Bitangent => {
             let (n, t) = (mesh.normals.get(vertex)?, mesh.tangents.get(vertex)?);
