@@ -10,6 +10,10 @@ pub mod front;
 
 pub use diagnostic::{Diagnostic, Result};
 
+#[cfg(test)]
+#[path = "../tests/fixtures/mod.rs"]
+mod fixtures;
+
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "search")]

@@ -5,6 +5,9 @@
 //! `support/plain.wgsl --scene <case>.toml`. What it says on stderr is `<case>.stderr`; `LODC_BLESS=1` rewrites that.
 #![cfg(feature = "cli")]
 
+mod fixtures;
+
+use fixtures::Goldens;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -65,12 +68,11 @@ fn arguments(case: &str, files: &BTreeMap<PathBuf, Vec<u8>>) -> Vec<String> {
 
 #[test]
 fn bad_input_is_located_and_loses_nothing() {
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/errors");
-    let bless = std::env::var_os("LODC_BLESS").is_some();
-    let before = files(&fixtures);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/errors");
+    let before = files(&folder);
     let scratch = Path::new(env!("CARGO_TARGET_TMPDIR")).join("errors");
     let cases = cases(&before);
-    let mut failures = Vec::new();
+    let mut goldens = Goldens::of("cli");
     for case in &cases {
         // A fresh copy, so that a case that writes does not disturb the others.
         let _ = fs::remove_dir_all(&scratch);
@@ -85,33 +87,21 @@ fn bad_input_is_located_and_loses_nothing() {
             .expect("lodc starts");
         let command = format!("(cd testdata/errors && lodc {})", arguments.join(" "));
         if output.status.code() != Some(2) {
-            failures.push(format!("{case}: {}, not 2: {command}", output.status));
+            goldens.wrong(format!("{case}: {}, not 2: {command}", output.status));
         }
         let after = files(&scratch);
         for path in after.keys().chain(before.keys()).collect::<BTreeSet<_>>() {
             if after.get(path) != before.get(path) {
-                failures.push(format!("{case}: touched {}: {command}", path.display()));
+                goldens.wrong(format!("{case}: touched {}: {command}", path.display()));
             }
         }
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         if stderr.trim().is_empty() || stderr.contains("panicked") {
-            failures.push(format!("{case}: says `{stderr}`: {command}"));
+            goldens.wrong(format!("{case}: says `{stderr}`: {command}"));
             continue;
         }
-        let golden = fixtures.join(format!("{case}.stderr"));
-        let expected = fs::read_to_string(&golden).unwrap_or_default();
-        if stderr == expected {
-            continue;
-        }
-        if bless {
-            fs::write(&golden, &stderr).expect("a writable checkout");
-        } else {
-            let diff = similar::TextDiff::from_lines(&expected, &stderr);
-            failures.push(format!(
-                "{case}: {command}\n{}",
-                diff.unified_diff().header("expected", "said")
-            ));
-        }
+        let golden = folder.join(format!("{case}.stderr"));
+        goldens.compare(&format!("{case}: {command}"), &golden, &stderr);
     }
     for orphan in before
         .keys()
@@ -119,11 +109,7 @@ fn bad_input_is_located_and_loses_nothing() {
         .filter_map(|path| path.file_stem()?.to_str())
         .filter(|stem| !cases.contains(*stem))
     {
-        failures.push(format!("{orphan}.stderr belongs to no case"));
+        goldens.wrong(format!("{orphan}.stderr belongs to no case"));
     }
-    assert!(
-        failures.is_empty(),
-        "{}\nif these are right: LODC_BLESS=1 cargo test --test cli",
-        failures.join("\n")
-    );
+    goldens.finish();
 }

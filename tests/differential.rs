@@ -2,6 +2,8 @@
 //! level as emitted against the error that the report gives it.
 #![cfg(feature = "search")]
 
+mod fixtures;
+
 use lodc::compile::{self, Request, normal_form};
 use lodc::eval::draw::shade;
 use lodc::eval::program::Program;
@@ -14,29 +16,11 @@ use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
 use naga::{Module, ShaderStage};
 use std::path::{Path, PathBuf};
 
-/// Every complete shader of the repository, with its scene when it has one.
-fn shaders() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut found: Vec<PathBuf> = ["testdata/materials", "testdata/shaders"]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("the folder is there"))
-        .map(|entry| entry.expect("it can be listed").path())
-        .filter(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "wgsl")
-        })
-        .filter(|path| !path.to_string_lossy().contains(".lod"))
-        .collect();
-    found.sort();
-    found
-}
-
 /// The materials, copied beside their textures with scenes of fewer pixels and levels, so that a search is quick.
 fn small_materials() -> Vec<PathBuf> {
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
     let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("differential");
     std::fs::create_dir_all(to.join("textures")).expect("the target folder can be written");
-    let mut shaders = Vec::new();
     for folder in ["", "textures"] {
         for entry in std::fs::read_dir(from.join(folder)).expect("the folder is there") {
             let path = entry.expect("it can be listed").path();
@@ -45,25 +29,23 @@ fn small_materials() -> Vec<PathBuf> {
             };
             let copy = to.join(folder).join(name);
             std::fs::copy(&path, &copy).expect("it can be copied");
-            match path.extension().and_then(|extension| extension.to_str()) {
-                Some("wgsl") if !path.to_string_lossy().contains(".lod.") => shaders.push(copy),
-                Some("toml") => {
-                    let text = std::fs::read_to_string(&path).expect("a scene is text");
-                    let kept = text.lines().filter(|line| {
-                        !line.starts_with("resolution") && !line.starts_with("levels")
-                    });
-                    let text: Vec<&str> = ["resolution = [64, 64]", "levels = 3"]
-                        .into_iter()
-                        .chain(kept)
-                        .collect();
-                    std::fs::write(&copy, text.join("\n")).expect("it can be written");
-                }
-                _ => {}
+            if path
+                .extension()
+                .is_some_and(|extension| extension == "toml")
+            {
+                let text = std::fs::read_to_string(&path).expect("a scene is text");
+                let kept = text
+                    .lines()
+                    .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
+                let text: Vec<&str> = ["resolution = [64, 64]", "levels = 3"]
+                    .into_iter()
+                    .chain(kept)
+                    .collect();
+                std::fs::write(&copy, text.join("\n")).expect("it can be written");
             }
         }
     }
-    shaders.sort();
-    shaders
+    fixtures::shaders(to)
 }
 
 fn read(path: &Path) -> (Source, Scene) {
@@ -158,7 +140,7 @@ fn program(shader: &Shader, stage: Stage) -> Option<Program> {
 
 #[test]
 fn normal_form_draws_what_the_source_draws() {
-    for path in shaders() {
+    for path in fixtures::complete() {
         let (source, scene) = read(&path);
         let written = programs(&source, &scene);
         let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));

@@ -3,6 +3,8 @@
 //! Both come from `.ci/run`. Where one is missing its tests say `SKIPPED` aloud, and fail when `CI` is set,
 //! so that a machine that lost it cannot pass in silence.
 
+mod fixtures;
+
 use lodc::emit::{self, EmitLevel, Form, Output, Target};
 use lodc::front::Source;
 use lodc_passes::{Facts, PASSES, Shader, normalize};
@@ -17,17 +19,7 @@ fn root() -> &'static Path {
 
 /// Names and texts of the `.wgsl` files of a folder under `testdata/`, in the order of their names.
 fn shaders(folder: &str) -> Vec<(String, String)> {
-    let folder = root().join("testdata").join(folder);
-    let mut paths: Vec<PathBuf> = fs::read_dir(&folder)
-        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
-        .map(|entry| entry.expect("a readable folder").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
-        // What the main job wrote there is no source.
-        .filter(|path| !path.to_string_lossy().contains(".lod."))
-        .collect();
-    paths.sort();
-    assert!(!paths.is_empty(), "no shaders in {}", folder.display());
-    paths
+    fixtures::shaders(Path::new("testdata").join(folder))
         .into_iter()
         .map(|path| {
             let name = path.file_stem().expect("a file").to_string_lossy();

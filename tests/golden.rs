@@ -14,23 +14,25 @@
 //! The facts are those of [`synthetic`] otherwise. `LODC_BLESS=1 cargo test --test golden` writes the golden
 //! files anew; the `expect` line is for hands only, so that blessing carelessly fails.
 
+mod fixtures;
 mod synthetic;
 
+use fixtures::Goldens;
+
+use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
 use lodc_passes::facts::{Facts, ValueFacts};
 use lodc_passes::{PASSES, Pass, Shader, ValueId};
-use similar::{ChangeTag, TextDiff};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[test]
 fn passes_do_to_their_fixtures_what_the_goldens_say() {
-    let bless = std::env::var_os("LODC_BLESS").is_some();
-    let mut wrong = Vec::new();
+    let mut goldens = Goldens::of("golden");
     for pass in PASSES {
-        for path in fixtures(pass.name()) {
+        for path in fixtures::shaders(Path::new("testdata/passes").join(pass.name())) {
             let (golden, offered) = golden(*pass, &path);
             let name = format!(
                 "{}/{}",
@@ -44,36 +46,12 @@ fn passes_do_to_their_fixtures_what_the_goldens_say() {
             let found = format!("{offered} candidates");
             if expected != Some(&found) {
                 let expected = expected.unwrap_or("nothing");
-                wrong.push(format!("{name} expects {expected}, but offers {found}\n"));
+                goldens.wrong(format!("{name} expects {expected}, but offers {found}\n"));
             }
-            let file = path.with_extension("diff");
-            let before = fs::read_to_string(&file).unwrap_or_default();
-            if bless {
-                fs::write(&file, &golden).expect("the golden can be written");
-            } else if before != golden {
-                let diff = TextDiff::from_lines(&before, &golden);
-                wrong.push(format!("{name}\n{}", diff.unified_diff()));
-            }
+            goldens.compare(&name, &path.with_extension("diff"), &golden);
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "{}\nto accept the new goldens: LODC_BLESS=1 cargo test --test golden",
-        wrong.join("\n")
-    );
-}
-
-fn fixtures(pass: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("testdata/passes")
-        .join(pass);
-    let entries = fs::read_dir(&folder).expect("every pass has fixtures");
-    let mut found: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("the folder can be read").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
-        .collect();
-    found.sort();
-    found
+    goldens.finish();
 }
 
 /// The golden text of a fixture, and how many candidates it has.
@@ -83,13 +61,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     // Without its comments, so that those are not in every diff.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
-    let shader = lodc_passes::normalize(
-        &source.module,
-        source.vertex.as_deref(),
-        &source.fragment,
-        100_000,
-    )
-    .unwrap_or_else(|e| fail(&e));
+    let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
     let before = fragment_stage(&source, &shader);
     let mut golden = String::new();
@@ -109,15 +81,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
         );
         let after = fragment_stage(&source, &pass.apply(&shader, &candidate));
         assert_ne!(before, after, "{name}: {candidate} changes nothing");
-        for change in TextDiff::from_lines(&before, &after).iter_all_changes() {
-            let sign = match change.tag() {
-                ChangeTag::Equal => ' ',
-                ChangeTag::Delete => '-',
-                ChangeTag::Insert => '+',
-            };
-            golden.push_str(format!("{sign} {}", change.value()).trim_end());
-            golden.push('\n');
-        }
+        golden.push_str(&fixtures::whole_diff(&before, &after));
         golden.push('\n');
     }
     if golden.is_empty() {

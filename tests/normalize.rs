@@ -3,17 +3,19 @@
 //!
 //! `LODC_BLESS=1 cargo test --test normalize` writes the golden files anew.
 
+mod fixtures;
+
+use fixtures::Goldens;
+use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
-use similar::{ChangeTag, TextDiff};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[test]
 fn normal_form_is_what_the_goldens_say() {
-    let bless = std::env::var_os("LODC_BLESS").is_some();
-    let mut wrong = Vec::new();
-    for path in fixtures() {
+    let mut goldens = Goldens::of("normalize");
+    for path in fixtures::shaders("testdata/passes/normalize") {
         let golden = golden(&path);
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         // Nothing may change but by hand.
@@ -21,33 +23,11 @@ fn normal_form_is_what_the_goldens_say() {
             .lines()
             .any(|line| !line.starts_with(' ') && !line.is_empty());
         if name.starts_with("keeps_") && changed {
-            wrong.push(format!("{name} changes\n{golden}"));
+            goldens.wrong(format!("{name} changes\n{golden}"));
         }
-        let file = path.with_extension("diff");
-        let before = fs::read_to_string(&file).unwrap_or_default();
-        if bless {
-            fs::write(&file, &golden).expect("the golden can be written");
-        } else if before != golden {
-            let diff = TextDiff::from_lines(&before, &golden);
-            wrong.push(format!("{name}\n{}", diff.unified_diff()));
-        }
+        goldens.compare(&name, &path.with_extension("diff"), &golden);
     }
-    assert!(
-        wrong.is_empty(),
-        "{}\nto accept the new goldens: LODC_BLESS=1 cargo test --test normalize",
-        wrong.join("\n")
-    );
-}
-
-fn fixtures() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/passes/normalize");
-    let entries = fs::read_dir(&folder).expect("there are fixtures");
-    let mut found: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("the folder can be read").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
-        .collect();
-    found.sort();
-    found
+    goldens.finish();
 }
 
 fn golden(path: &Path) -> String {
@@ -55,13 +35,7 @@ fn golden(path: &Path) -> String {
     let text = fs::read_to_string(path).expect("the fixture can be read");
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
-    let shader = lodc_passes::normalize(
-        &source.module,
-        source.vertex.as_deref(),
-        &source.fragment,
-        100_000,
-    )
-    .unwrap_or_else(|e| fail(&e));
+    let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let level = EmitLevel {
         autolod: 1.0,
         shader,
@@ -83,15 +57,5 @@ fn golden(path: &Path) -> String {
         .skip_while(|line| line.starts_with("//") || line.is_empty())
         .flat_map(|line| [line, "\n"])
         .collect();
-    let mut golden = String::new();
-    for change in TextDiff::from_lines(&text, &after).iter_all_changes() {
-        let sign = match change.tag() {
-            ChangeTag::Equal => ' ',
-            ChangeTag::Delete => '-',
-            ChangeTag::Insert => '+',
-        };
-        golden.push_str(format!("{sign} {}", change.value()).trim_end());
-        golden.push('\n');
-    }
-    golden
+    fixtures::whole_diff(&text, &after)
 }

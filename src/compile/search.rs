@@ -225,7 +225,7 @@ impl Ready {
             },
             scene: self.scene_file.as_ref().map(|file| emit::LockedFile {
                 file: relative(folder, file),
-                hash: emit::hash(&std::fs::read(file).unwrap_or_default()),
+                hash: self.hash_of(&file.display().to_string()),
             }),
             textures: self
                 .scene

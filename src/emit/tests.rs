@@ -1,13 +1,11 @@
 //! Emission as a whole: small shaders for what is easily got wrong, and every shader under `testdata/`.
 
 use super::*;
-use std::fs;
+use crate::fixtures;
 
 /// The normal form of a source.
 fn base(source: &Source) -> Shader {
-    let vertex = source.vertex.as_deref();
-    lodc_passes::normalize(&source.module, vertex, &source.fragment, 100_000)
-        .unwrap_or_else(|e| panic!("{e}"))
+    crate::compile::normal_form(source).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A level that does what the source does.
@@ -473,7 +471,7 @@ fn a_constant_without_a_default_is_named_where_it_cannot_be_carried() {
 #[test]
 fn every_shader_is_emitted_in_every_form() {
     let mut seen = 0;
-    for path in shaders() {
+    for path in fixtures::complete() {
         let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
         let first = level(&source, 0.85);
         let second = EmitLevel {
@@ -510,20 +508,6 @@ fn every_shader_is_emitted_in_every_form() {
         seen += 1;
     }
     assert!(seen > 30, "{seen}");
-}
-
-/// Every shader under `testdata/` that is one.
-fn shaders() -> Vec<PathBuf> {
-    let mut paths: Vec<_> = ["testdata/materials", "testdata/shaders"]
-        .into_iter()
-        .flat_map(|folder| fs::read_dir(folder).expect("it is there"))
-        .map(|entry| entry.expect("it can be read").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
-        // What the main job wrote there is no source.
-        .filter(|path| !path.to_string_lossy().contains(".lod."))
-        .collect();
-    paths.sort();
-    paths
 }
 
 #[cfg(feature = "search")]
@@ -583,7 +567,7 @@ mod meaning {
 
     #[test]
     fn every_level_does_what_its_variant_does() {
-        let paths = shaders();
+        let paths = fixtures::complete();
         assert!(paths.len() > 30, "{}", paths.len());
         paths.par_iter().for_each(|path| {
             let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
