@@ -130,13 +130,7 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
         &source.fragment,
         EXPRESSION_LIMIT,
     )
-    .map_err(|error| {
-        let located = Diagnostic::error(error.message).with_source(&source.name, &source.text);
-        match error.span.to_range() {
-            Some(range) => located.with_label(range, "here"),
-            None => located,
-        }
-    })
+    .map_err(|error| source.error(error.message, error.span, "here"))
 }
 
 /// Emits from the lock, without a search: what `--locked` and a build script do. Warnings come beside the files: a
@@ -147,6 +141,7 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
 pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
     let path = request.lock();
     let (lock, text) = Lock::read(&path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
     let stages = Stages {
         vertex: request
             .stages
@@ -158,11 +153,14 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
             .fragment
             .clone()
             .or_else(|| Some(lock.source.fragment.clone())),
+        vertex_file: request.stages.vertex_file.clone().or_else(|| {
+            let file = lock.source.vertex_file.as_ref()?;
+            Some(folder.join(file))
+        }),
     };
     let source = Source::read_stages(&request.shader, &stages)?;
     let base = normal_form(&source)?;
     let levels = lock.replay(&base, &path.display().to_string(), &text)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
     let changed = |file: &str, hash: &str| {
         std::fs::read(folder.join(file)).map_or(true, |bytes| emit::hash(&bytes) != hash)
     };

@@ -49,6 +49,9 @@ struct InputArgs {
     /// The fragment entry point, where there are several
     #[arg(long, value_name = "NAME")]
     fragment: Option<String>,
+    /// The file with the vertex stage, where it is another one
+    #[arg(long, value_name = "FILE")]
+    vertex_file: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -113,6 +116,7 @@ impl InputArgs {
             stages: Stages {
                 vertex: self.vertex,
                 fragment: self.fragment,
+                vertex_file: self.vertex_file,
             },
             ..Request::default()
         }

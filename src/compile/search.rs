@@ -109,7 +109,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let report = Report::new(
         &found,
         &ready.base,
-        &ready.source.text,
+        &ready.source,
         &says,
         ready.origin(request),
     );
@@ -150,8 +150,10 @@ impl Ready {
             .textures
             .iter()
             .flat_map(|texture| self.texture_files(texture));
+        let others = self.source.others.iter();
         [request.shader.clone()]
             .into_iter()
+            .chain(others.filter_map(|file| file.path.clone()))
             .chain(self.scene_file.clone())
             .chain(textures)
     }
@@ -220,7 +222,16 @@ impl Ready {
             source: emit::LockedSource {
                 file: relative(folder, &request.shader),
                 normal_form: self.base.fingerprint().to_string(),
-                vertex: self.source.vertex.clone(),
+                vertex: match &request.stages.vertex_file {
+                    // In a file of its own it may have had another name.
+                    Some(_) => request.stages.vertex.clone(),
+                    None => self.source.vertex.clone(),
+                },
+                vertex_file: request
+                    .stages
+                    .vertex_file
+                    .as_ref()
+                    .map(|file| relative(folder, file)),
                 fragment: self.source.fragment.clone(),
             },
             scene: self.scene_file.as_ref().map(|file| emit::LockedFile {
@@ -315,7 +326,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let tried = search::try_each(&set, &ready.base, &candidates);
     Ok(crate::report::inspection(
         &ready.base,
-        &ready.source.text,
+        &ready.source,
         distance,
         set.original(),
         &tried,

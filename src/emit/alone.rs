@@ -144,7 +144,7 @@ fn directives(author: &Text<'_>, printed: &Printed) -> Vec<String> {
 }
 
 /// A module's text from its parts: blank lines around what takes several lines.
-fn assembled(header: &str, directives: &[String], items: &[(Keyword, &str)]) -> String {
+pub(crate) fn assembled(header: &str, directives: &[String], items: &[(Keyword, &str)]) -> String {
     let mut out = header.to_owned();
     for directive in directives {
         out.push_str(directive);

@@ -46,8 +46,10 @@ pub struct LockedSource {
     pub file: String,
     /// The fingerprint of its normal form ([`lodc_passes::Fingerprint`]); the lock is stale when it differs.
     pub normal_form: String,
-    /// The vertex entry point; `None` when the file has none.
+    /// The vertex entry point, by its name in its file; `None` when there is none, or no need to choose one.
     pub vertex: Option<String>,
+    /// The file of the vertex entry point, relative to the lock, where it is another one.
+    pub vertex_file: Option<String>,
     /// The fragment entry point.
     pub fragment: String,
 }
@@ -121,12 +123,14 @@ impl Lock {
         };
         line(format!("format = {FORMAT}"));
         let source = &self.source;
-        let vertex = source
-            .vertex
-            .as_ref()
-            .map_or(String::new(), |name| format!(", vertex = {}", string(name)));
+        let optional = |key: &str, value: &Option<String>| {
+            let value = value.as_ref();
+            value.map_or_else(String::new, |v| format!(", {key} = {}", string(v)))
+        };
+        let vertex = optional("vertex", &source.vertex);
+        let vertex_file = optional("vertex_file", &source.vertex_file);
         line(format!(
-            "source = {{ file = {}, normal_form = {}{vertex}, fragment = {} }}",
+            "source = {{ file = {}, normal_form = {}{vertex}{vertex_file}, fragment = {} }}",
             string(&source.file),
             string(&source.normal_form),
             string(&source.fragment)
@@ -257,6 +261,7 @@ impl Lock {
                 file: raw.source.file,
                 normal_form: raw.source.normal_form,
                 vertex: raw.source.vertex,
+                vertex_file: raw.source.vertex_file,
                 fragment: raw.source.fragment,
             },
             scene: raw.scene,
@@ -426,6 +431,7 @@ struct RawSource {
     file: String,
     normal_form: String,
     vertex: Option<String>,
+    vertex_file: Option<String>,
     fragment: String,
 }
 
@@ -511,6 +517,7 @@ mod tests {
                 file: "a \"quoted\" brick.wgsl".into(),
                 normal_form: "00112233445566778899aabbccddeeff".into(),
                 vertex: None,
+                vertex_file: None,
                 fragment: "fs_wall".into(),
             },
             scene: Some(LockedFile {

@@ -7,11 +7,12 @@
 //! base + Lock --replay--> [EmitLevel]
 //! ```
 //!
-//! The author's text stays as it is; level 0 is that text. Everything here is a function of its arguments,
+//! The author's WGSL text stays as it is; level 0 is that text. A source of several files is written as one first. Everything here is a function of its arguments,
 //! and [`write_atomically`] is the only thing that touches the disk.
 
 mod alone;
 mod body;
+mod composed;
 mod control;
 mod lines;
 mod lock;
@@ -146,6 +147,7 @@ pub fn emit_as(
     stem: &str,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     check_thresholds(levels)?;
+    let source = &*composed::composed(source)?;
     let written = |stem: String, text: String| -> Result<Vec<(PathBuf, Vec<u8>)>> {
         let read = read_back(&text, source)?;
         match output.target {
@@ -202,6 +204,7 @@ fn read_back(text: &str, source: &Source) -> Result<Source> {
     let stages = Stages {
         vertex: source.vertex.clone(),
         fragment: Some(source.fragment.clone()),
+        vertex_file: None,
     };
     let name = format!("{} (as emitted)", source.name);
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);

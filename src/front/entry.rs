@@ -1,16 +1,20 @@
 //! Entry points: which two lodc works on, and what they are fed.
 
+use super::Source;
 use super::names::{function_name, listed, nearest, whole_word};
 use crate::{Diagnostic, Result};
 use naga::{Binding, Handle, Module, ShaderStage, Span, Type, TypeInner};
+use std::path::PathBuf;
 
-/// The entry points that the user asked for, by name; what is `None` must be unambiguous.
+/// The entry points that the user asked for; what is `None` must be unambiguous.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Stages {
     /// The vertex entry point (`--vertex`).
     pub vertex: Option<String>,
     /// The fragment entry point (`--fragment`).
     pub fragment: Option<String>,
+    /// The file of the vertex entry point, where it is another one (`--vertex-file`).
+    pub vertex_file: Option<PathBuf>,
 }
 
 /// One input of an entry point: an argument, or a member of an argument that is a struct.
@@ -26,8 +30,9 @@ pub struct Input {
     pub span: Span,
 }
 
-/// The inputs of the entry point at `entry`, flattened, in order. `text` is what the module was parsed from.
-pub fn inputs(module: &Module, entry: usize, text: &str) -> Vec<Input> {
+/// The inputs of the entry point at `entry` of a source's module, flattened, in order.
+pub fn inputs(source: &Source, entry: usize) -> Vec<Input> {
+    let module = &source.module;
     let mut inputs = Vec::new();
     let Some(entry) = module.entry_points.get(entry) else {
         return inputs;
@@ -37,30 +42,35 @@ pub fn inputs(module: &Module, entry: usize, text: &str) -> Vec<Input> {
             (Some(binding), _) => {
                 let name = argument.name.clone().unwrap_or_default();
                 // naga keeps no span of an argument: it is the first such word after the function's name.
-                let span = function_name(text, &entry.name)
-                    .and_then(|at| whole_word(text, at.end..text.len(), &name));
+                let span = source.files().find_map(|file| {
+                    let text = file.text;
+                    let at = function_name(text, &entry.name)?;
+                    let at = whole_word(text, at.end..text.len(), &name)?;
+                    Some(file.span(at))
+                });
                 inputs.push(Input {
                     name,
                     binding: binding.clone(),
                     ty: argument.ty,
-                    span: span.map(Span::from).unwrap_or_default(),
+                    span: span.unwrap_or_default(),
                 });
             }
             (None, TypeInner::Struct { members, .. }) => {
-                let declared = module.types.get_span(argument.ty).to_range();
+                let declared = source.place(module.types.get_span(argument.ty));
                 for member in members {
                     let Some(binding) = &member.binding else {
                         continue;
                     };
                     let name = member.name.clone().unwrap_or_default();
-                    let span = declared
-                        .clone()
-                        .and_then(|all| whole_word(text, all, &name));
+                    let span = declared.as_ref().and_then(|place| {
+                        let at = whole_word(place.file.text, place.range.clone(), &name)?;
+                        Some(place.file.span(at))
+                    });
                     inputs.push(Input {
                         name,
                         binding: binding.clone(),
                         ty: member.ty,
-                        span: span.map(Span::from).unwrap_or_default(),
+                        span: span.unwrap_or_default(),
                     });
                 }
             }
@@ -71,52 +81,12 @@ pub fn inputs(module: &Module, entry: usize, text: &str) -> Vec<Input> {
 }
 
 /// Chooses the vertex (or none) and the fragment entry point, and checks that they fit together.
-pub(super) fn choose(
-    name: &str,
-    text: &str,
-    module: &Module,
-    stages: &Stages,
-) -> Result<(Option<String>, String)> {
-    let of = |stage: ShaderStage| -> Vec<&str> {
-        let entries = module.entry_points.iter().filter(|e| e.stage == stage);
-        entries.map(|e| e.name.as_str()).collect()
-    };
-    let (vertices, fragments) = (of(ShaderStage::Vertex), of(ShaderStage::Fragment));
-    let located = |message: String, names: &[&str]| {
-        let found = Diagnostic::error(message).with_source(name, text);
-        names
-            .iter()
-            .filter_map(|n| function_name(text, n))
-            .fold(found, |d, place| d.with_label(place, ""))
-    };
-    let pick = |what: &str, have: &[&str], wanted: Option<&str>| match (wanted, have) {
-        (None, []) => Ok(None),
-        (None, [only]) => Ok(Some((*only).to_owned())),
-        (None, several) => Err(located(
-            format!(
-                "`{name}` has several {what} entry points: {}",
-                listed(several.iter().copied())
-            ),
-            several,
-        )
-        .with_note(format!("choose one: `--{what} {}`", several[0]))),
-        (Some(wanted), have) if have.contains(&wanted) => Ok(Some(wanted.to_owned())),
-        (Some(wanted), have) => {
-            let missing =
-                Diagnostic::error(format!("`{name}` has no {what} entry point `{wanted}`"));
-            let near = nearest(wanted, have.iter().copied(), 1);
-            Err(match (near.first(), have) {
-                (Some(near), _) => missing.with_note(format!("there is a `{near}`")),
-                (None, []) => missing.with_note(format!("it has no {what} entry point at all")),
-                (None, have) => {
-                    missing.with_note(format!("it has {}", listed(have.iter().copied())))
-                }
-            })
-        }
-    };
-    let fragment = pick("fragment", &fragments, stages.fragment.as_deref())?;
+pub(super) fn choose(source: &Source, stages: &Stages) -> Result<(Option<String>, String)> {
+    let module = &source.module;
+    let pick = |stage, wanted| pick(&source.name, &source.text, module, stage, wanted);
+    let fragment = pick(ShaderStage::Fragment, stages.fragment.as_deref())?;
     let Some(fragment) = fragment else {
-        let none = Diagnostic::error(format!("`{name}` has no fragment entry point"));
+        let none = Diagnostic::error(format!("`{}` has no fragment entry point", source.name));
         let others: Vec<String> = module
             .entry_points
             .iter()
@@ -138,12 +108,53 @@ pub(super) fn choose(
             none.with_note("lodc works on a function marked `@fragment`")
         });
     };
-    check_colour(name, text, module, &fragment)?;
-    let vertex = pick("vertex", &vertices, stages.vertex.as_deref())?;
+    check_colour(source, &fragment)?;
+    let vertex = pick(ShaderStage::Vertex, stages.vertex.as_deref())?;
     if let Some(vertex) = &vertex {
-        check_link(name, text, module, vertex, &fragment)?;
+        check_stages(source, vertex, &fragment)?;
     }
     Ok((vertex, fragment))
+}
+
+/// The entry point of a stage: the one that is wanted, or the only one. `name` and `text` are the file's.
+pub(super) fn pick(
+    name: &str,
+    text: &str,
+    module: &Module,
+    stage: ShaderStage,
+    wanted: Option<&str>,
+) -> Result<Option<String>> {
+    let entries = module.entry_points.iter().filter(|e| e.stage == stage);
+    let have: Vec<&str> = entries.map(|e| e.name.as_str()).collect();
+    let what = stage_name(stage);
+    match (wanted, have.as_slice()) {
+        (None, []) => Ok(None),
+        (None, [only]) => Ok(Some((*only).to_owned())),
+        (None, several) => {
+            let found = Diagnostic::error(format!(
+                "`{name}` has several {what} entry points: {}",
+                listed(several.iter().copied())
+            ))
+            .with_source(name, text);
+            let places = several.iter().filter_map(|n| function_name(text, n));
+            Err(places
+                .fold(found, |d, place| d.with_label(place, ""))
+                .with_note(format!("choose one: `--{what} {}`", several[0])))
+        }
+        (Some(wanted), have) if have.contains(&wanted) => Ok(Some(wanted.to_owned())),
+        (Some(wanted), have) => {
+            let missing =
+                Diagnostic::error(format!("`{name}` has no {what} entry point `{wanted}`"));
+            let near = nearest(wanted, have.iter().copied(), 1);
+            Err(match (near.first(), have) {
+                (Some(near), _) => missing.with_note(format!("there is a `{near}`")),
+                (None, []) => missing.with_note(format!("it has no {what} entry point at all")),
+                (None, have) => {
+                    missing.with_note(format!("it has {}", listed(have.iter().copied())))
+                }
+            })
+        }
+    }
 }
 
 fn stage_name(stage: ShaderStage) -> String {
@@ -151,7 +162,8 @@ fn stage_name(stage: ShaderStage) -> String {
 }
 
 /// The fragment stage must return a colour: that is what variants are compared by.
-fn check_colour(name: &str, text: &str, module: &Module, fragment: &str) -> Result<()> {
+pub(super) fn check_colour(source: &Source, fragment: &str) -> Result<()> {
+    let (module, text) = (&source.module, &source.text);
     let mut entries = module.entry_points.iter();
     let entry = entries.find(|e| e.stage == ShaderStage::Fragment && e.name == fragment);
     let is_colour =
@@ -167,7 +179,7 @@ fn check_colour(name: &str, text: &str, module: &Module, fragment: &str) -> Resu
         return Ok(());
     }
     let error = Diagnostic::error(format!("`{fragment}` returns no colour at location 0"))
-        .with_source(name, text);
+        .with_source(&source.name, text);
     let error = match function_name(text, fragment) {
         Some(place) => error.with_label(place, "what it returns is compared"),
         None => error,
@@ -178,7 +190,8 @@ fn check_colour(name: &str, text: &str, module: &Module, fragment: &str) -> Resu
 
 /// Every location that the fragment stage reads must be written by the vertex stage, in a type that fits.
 /// naga validates each stage alone.
-fn check_link(name: &str, text: &str, module: &Module, vertex: &str, fragment: &str) -> Result<()> {
+pub(super) fn check_stages(source: &Source, vertex: &str, fragment: &str) -> Result<()> {
+    let module = &source.module;
     let find = |stage, wanted: &str| {
         let mut all = module.entry_points.iter();
         all.position(|e| e.stage == stage && e.name == wanted)
@@ -203,17 +216,12 @@ fn check_link(name: &str, text: &str, module: &Module, vertex: &str, fragment: &
             _ => {}
         }
     }
-    for input in inputs(module, f, text) {
+    for input in inputs(source, f) {
         let Binding::Location { location, .. } = input.binding else {
             continue;
         };
-        let wrong = |message: String| {
-            let error = Diagnostic::error(message).with_source(name, text);
-            match input.span.to_range() {
-                Some(place) => error.with_label(place, format!("read by `{fragment}`")),
-                None => error,
-            }
-        };
+        let wrong =
+            |message: String| source.error(message, input.span, format!("read by `{fragment}`"));
         match written.iter().find(|(at, _)| *at == location) {
             None => {
                 return Err(wrong(format!(
@@ -250,7 +258,6 @@ fn check_link(name: &str, text: &str, module: &Module, vertex: &str, fragment: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::front::Source;
 
     const TWO: &str = "
         @vertex fn va() -> @builtin(position) vec4f { return vec4f(); }
@@ -262,6 +269,7 @@ mod tests {
         Stages {
             vertex: vertex.map(str::to_owned),
             fragment: fragment.map(str::to_owned),
+            vertex_file: None,
         }
     }
 
@@ -377,7 +385,7 @@ mod tests {
         let text = "struct I { @location(1) uv: vec2f, @builtin(front_facing) front: bool }
             @fragment fn fs(i: I, @location(0) tint: vec3f) -> @location(0) vec4f { return vec4f(tint, i.uv.x); }";
         let source = Source::parse("a.wgsl", text).unwrap();
-        let found: Vec<_> = inputs(&source.module, 0, text)
+        let found: Vec<_> = inputs(&source, 0)
             .into_iter()
             .map(|i| (i.name.clone(), &text[i.span.to_range().unwrap()]))
             .map(|(a, b)| (a, b.to_owned()))

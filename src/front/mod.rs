@@ -2,18 +2,22 @@
 //!
 //! ```text
 //! path --read--> text --parse--> Module --validate--> ModuleInfo --choose--> Source
+//!        vertex file: text --parse--> Module --link--> Module of both
 //! ```
 //!
 //! Whatever is wrong is said at its place in the user's file.
 
 mod entry;
 mod feed;
+mod files;
+mod link;
 pub(crate) mod names;
 mod parse;
 mod vertex_stage;
 
 pub use entry::{Input, Stages, inputs};
 pub use feed::Feed;
+pub use files::{File, OtherFile, Place};
 pub use parse::{CAPABILITIES, validate};
 pub use vertex_stage::VertexStage;
 
@@ -29,9 +33,13 @@ pub struct Source {
     pub name: String,
     /// Where it was read from; `None` for a text that came from no file.
     pub path: Option<PathBuf>,
-    /// The text that spans point into.
+    /// Its text, which spans point into before they point into those of `others`.
     pub text: String,
-    /// The module, with everything that the file declares.
+    /// The other files that the module is made from.
+    pub others: Vec<OtherFile>,
+    /// Whether `text` is WGSL that says all of the module, so that emission keeps it as it is.
+    pub verbatim: bool,
+    /// The module, with everything that the file declares; of several files, what their entry points need.
     pub module: Module,
     /// What the validator found out about it.
     pub info: ModuleInfo,
@@ -60,7 +68,10 @@ impl Source {
         // Before the extension: a folder has none, and that is not what is wrong with it.
         let text = read_text(path, "shader");
         parse::expect_wgsl(path, &name, text.is_ok())?;
-        let mut source = Self::parse_stages(&name, text?, stages)?;
+        let mut source = match &stages.vertex_file {
+            None => Self::parse_stages(&name, text?, stages)?,
+            Some(vertex) => Self::parsed(&name, text?)?.with_vertex(vertex, stages)?,
+        };
         source.path = Some(path.to_owned());
         Ok(source)
     }
@@ -78,18 +89,108 @@ impl Source {
     /// # Errors
     /// As [`Source::parse`], and when a name is not there.
     pub fn parse_stages(name: &str, text: impl Into<String>, stages: &Stages) -> Result<Self> {
-        let text = text.into();
+        let mut source = Self::parsed(name, text.into())?;
+        (source.vertex, source.fragment) = entry::choose(&source, stages)?;
+        Ok(source)
+    }
+
+    /// A text with no entry point chosen yet.
+    fn parsed(name: &str, text: String) -> Result<Self> {
         let (module, info) = parse::parse(name, &text)?;
-        let (vertex, fragment) = entry::choose(name, &text, &module, stages)?;
         Ok(Self {
             name: name.to_owned(),
             path: None,
             text,
+            others: Vec::new(),
+            verbatim: true,
             module,
             info,
-            vertex,
-            fragment,
+            vertex: None,
+            fragment: String::new(),
         })
+    }
+
+    /// This source with the vertex stage of another file linked to it.
+    fn with_vertex(mut self, path: &Path, stages: &Stages) -> Result<Self> {
+        let name = path.display().to_string();
+        let text = read_text(path, "shader");
+        parse::expect_wgsl(path, &name, text.is_ok())?;
+        let text = text?;
+        let (module, _) = parse::parse(&name, &text)?;
+        let wanted = stages.vertex.as_deref();
+        let Some(vertex) = entry::pick(&name, &text, &module, ShaderStage::Vertex, wanted)? else {
+            return Err(
+                Diagnostic::error(format!("`{name}` has no vertex entry point"))
+                    .with_note("name the file that has one with `--vertex-file`"),
+            );
+        };
+        let start = self.end();
+        self.others.push(OtherFile {
+            name,
+            path: Some(path.to_owned()),
+            text,
+            start,
+        });
+        let behind = |span: Span| match span.to_range() {
+            Some(range) => Span::from(range.start + start..range.end + start),
+            None => span,
+        };
+        let linked = link::link(&[
+            link::Part {
+                module: &self.module,
+                wanted: &|_| true,
+                place: &|span| span,
+            },
+            link::Part {
+                module: &module,
+                wanted: &|e| e.stage == ShaderStage::Vertex && e.name == vertex,
+                place: &behind,
+            },
+        ]);
+        let module = linked.map_err(|clash| self.clash(&clash))?;
+        self.with_module(module, stages)
+    }
+
+    /// What two files declare differently, at the second one's place.
+    fn clash(&self, clash: &link::Clash) -> Box<Diagnostic> {
+        let error = self.error(
+            format!("{} is declared differently in two files", clash.what),
+            clash.second,
+            "here",
+        );
+        let error = match self.place(clash.first) {
+            Some(first) => error.with_reason(format!(
+                "the other declaration is in {}:{}",
+                first.file.name,
+                first.line()
+            )),
+            None => error,
+        };
+        error.with_note("the stages are drawn together: declare it alike in both files")
+    }
+
+    /// This source with a module that was linked of several, whose vertex entry point is the last one.
+    fn with_module(mut self, module: Module, stages: &Stages) -> Result<Self> {
+        self.info = validate(&module).map_err(|error| {
+            let spans: Vec<_> = error.spans().cloned().collect();
+            let message = format!("the stages do not fit together: {}", error.as_inner());
+            spans
+                .iter()
+                .fold(Diagnostic::error(message), |d, (span, _)| {
+                    self.locate(d, *span, "here")
+                })
+        })?;
+        self.module = module;
+        self.verbatim = false;
+        let last = self.module.entry_points.last();
+        let vertex = last.filter(|e| e.stage == ShaderStage::Vertex);
+        let chosen = Stages {
+            vertex: vertex.map(|e| e.name.clone()),
+            fragment: stages.fragment.clone(),
+            vertex_file: None,
+        };
+        (self.vertex, self.fragment) = entry::choose(&self, &chosen)?;
+        Ok(self)
     }
 
     /// The place of the fragment entry point in the module, and the entry point.
@@ -107,10 +208,11 @@ impl Source {
     pub fn variable(&self, variable: Handle<GlobalVariable>) -> Span {
         let declared = self.module.global_variables.get_span(variable);
         let name = self.module.global_variables[variable].name.as_deref();
-        declared
-            .to_range()
-            .and_then(|all| names::whole_word(&self.text, all, name?))
-            .map_or(declared, Span::from)
+        let found = self.place(declared).and_then(|place| {
+            let name = names::whole_word(place.file.text, place.range, name?)?;
+            Some(place.file.span(name))
+        });
+        found.unwrap_or(declared)
     }
 
     fn entry(&self, stage: ShaderStage, name: &str) -> Option<(usize, &EntryPoint)> {
@@ -128,18 +230,32 @@ impl Source {
         self.locate(Diagnostic::error(message), span, remark)
     }
 
-    /// Puts a diagnostic at a place in this file; without a defined span, at the file alone.
+    /// Puts a diagnostic at a place in a file of this source; without a defined span, at the main file
+    /// alone. A further place goes into the same file, or is named in a note.
     pub fn locate(
         &self,
         diagnostic: Box<Diagnostic>,
         span: Span,
         remark: impl Into<String>,
     ) -> Box<Diagnostic> {
-        let diagnostic = diagnostic.with_source(&self.name, &self.text);
-        match span.to_range() {
-            Some(range) => diagnostic.with_label(range, remark),
-            None => diagnostic,
+        let remark = remark.into();
+        let Some(place) = self.place(span) else {
+            return match diagnostic.source {
+                Some(_) => diagnostic,
+                None => diagnostic.with_source(&self.name, &self.text),
+            };
+        };
+        let elsewhere = match &diagnostic.source {
+            Some((name, _)) if !diagnostic.labels.is_empty() => name != place.file.name,
+            _ => false,
+        };
+        if elsewhere {
+            let line = place.line();
+            return diagnostic.with_reason(format!("{remark}: {}:{line}", place.file.name));
         }
+        diagnostic
+            .with_source(place.file.name, place.file.text)
+            .with_label(place.range, remark)
     }
 }
 
@@ -289,6 +405,83 @@ mod tests {
         ] {
             assert!(error.message.contains(part), "{error}");
         }
+    }
+
+    const VERTEX: &[u8] = b"struct V { @builtin(position) p: vec4f, @location(0) uv: vec2f }
+        @group(0) @binding(0) var<uniform> camera: mat4x4f;
+        @vertex fn main(@location(0) at: vec3f) -> V { return V(camera * vec4f(at, 1.0), at.xy); }";
+
+    fn two_files(folder: &Folder, fragment: &[u8]) -> Result<Source> {
+        let stages = Stages {
+            vertex_file: Some(folder.write("v.wgsl", VERTEX)),
+            ..Stages::default()
+        };
+        Source::read_stages(&folder.write("f.wgsl", fragment), &stages)
+    }
+
+    #[test]
+    fn a_vertex_file_is_linked_and_its_places_are_in_it() {
+        let folder = Folder::new("vertex");
+        let source = two_files(
+            &folder,
+            b"@fragment fn main(@location(0) uv: vec2f) -> @location(0) vec4f { return uv.xyxy; }",
+        )
+        .unwrap();
+        assert_eq!(source.vertex.as_deref(), Some("main_vertex"));
+        assert_eq!(source.fragment, "main");
+        assert!(!source.verbatim);
+        let (camera, _) = source.module.global_variables.iter().next().unwrap();
+        let place = source.place(source.variable(camera)).unwrap();
+        assert!(place.file.name.ends_with("v.wgsl"));
+        assert_eq!(&place.file.text[place.range.clone()], "camera");
+        assert_eq!(place.line(), 2);
+        let (entry, _) = source.vertex_entry().unwrap();
+        let at = source.place(inputs(&source, entry)[0].span);
+        // Its entry point is called otherwise in its file, so that its arguments are not found there.
+        assert!(at.is_none());
+    }
+
+    #[test]
+    fn stages_in_two_files_must_fit() {
+        let folder = Folder::new("unfit");
+        let error = two_files(
+            &folder,
+            b"@group(0) @binding(0) var<uniform> tint: vec4f;
+            @fragment fn fs() -> @location(0) vec4f { return tint; }",
+        )
+        .unwrap_err();
+        assert!(
+            error
+                .message
+                .contains("`@group(0) @binding(0)` is declared differently"),
+            "{error}"
+        );
+        let shown = error.to_string();
+        assert!(
+            shown.contains("v.wgsl:2:") && shown.contains("f.wgsl:1"),
+            "{shown}"
+        );
+        let error = two_files(
+            &folder,
+            b"@fragment fn fs(@location(3) n: vec3f) -> @location(0) vec4f { return n.xyzz; }",
+        )
+        .unwrap_err();
+        assert!(
+            error
+                .message
+                .contains("at location 3, which `main` does not write"),
+            "{error}"
+        );
+        let missing = Stages {
+            vertex: Some("vs".to_owned()),
+            vertex_file: Some(folder.0.join("v.wgsl")),
+            ..Stages::default()
+        };
+        let error = Source::read_stages(&folder.0.join("f.wgsl"), &missing).unwrap_err();
+        assert!(
+            error.message.contains("no vertex entry point `vs`"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -48,7 +48,7 @@ impl VertexStage {
         let (entry, _) = source.fragment_entry();
         let mut feeds = Vec::new();
         let mut unknown = Vec::new();
-        for input in inputs(&source.module, entry, &source.text) {
+        for input in inputs(source, entry) {
             if !matches!(input.binding, Binding::Location { .. }) {
                 continue;
             }

@@ -7,6 +7,7 @@ mod terminal;
 
 pub use terminal::{inspection, next, summary, table};
 
+use crate::front::{Place, Source};
 use crate::search::{AtDistance, Found, Level};
 use lodc_passes::{Class, PASSES, Shader, Work};
 use serde::Serialize;
@@ -145,7 +146,11 @@ pub struct StepReport {
     pub choice: String,
     /// Olano's class.
     pub class: Option<Class>,
-    /// The line of the value in the source, from 1.
+    /// The file that the value is in, when it is not the shader's own but an imported module, or that of the
+    /// vertex stage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// The line of the value in its file, from 1.
     pub line: Option<u32>,
     /// RMSE of the variant after this step.
     pub error_after: Option<f64>,
@@ -193,10 +198,16 @@ pub struct Origin {
 }
 
 impl Report {
-    /// The report of a search. `says` words each level; `text` is the source that lines are counted in.
-    pub fn new(found: &Found, base: &Shader, text: &str, says: &[String], origin: Origin) -> Self {
+    /// The report of a search. `says` words each level; `source` is what `base` is the normal form of.
+    pub fn new(
+        found: &Found,
+        base: &Shader,
+        source: &Source,
+        says: &[String],
+        origin: Origin,
+    ) -> Self {
         let level = |(level, says): (&Level, &String)| {
-            level_report(level, says.clone(), base, text, &origin)
+            level_report(level, says.clone(), base, source, &origin)
         };
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -224,11 +235,12 @@ fn level_report(
     level: &Level,
     says: String,
     base: &Shader,
-    text: &str,
+    source: &Source,
     origin: &Origin,
 ) -> LevelReport {
     let error = &level.error;
     let steps = level.recipe.0.iter().enumerate();
+    let place = |site| base.find(site).and_then(|at| place_of(base, source, at));
     LevelReport {
         autolod: level.autolod,
         distance: level.distance,
@@ -264,7 +276,8 @@ fn level_report(
             triangles: origin.triangles,
         },
         recipe: steps
-            .map(|(i, candidate)| StepReport {
+            .map(|(i, candidate)| (i, candidate, place(&candidate.site)))
+            .map(|(i, candidate, place)| StepReport {
                 pass: candidate.pass.clone(),
                 site: candidate.site.to_string(),
                 choice: candidate.choice.clone(),
@@ -272,9 +285,11 @@ fn level_report(
                     .iter()
                     .find(|pass| pass.name() == candidate.pass)
                     .map(|pass| pass.class(candidate)),
-                line: base
-                    .find(&candidate.site)
-                    .and_then(|place| line_of(base, text, place)),
+                file: place
+                    .as_ref()
+                    .filter(|place| !place.is_in_main())
+                    .map(|place| place.file.name.to_owned()),
+                line: place.map(|place| place.line()),
                 error_after: level.error_after.get(i).copied(),
             })
             .collect(),
@@ -291,12 +306,11 @@ fn frontier(at: &AtDistance) -> impl Iterator<Item = FrontierReport> + '_ {
     })
 }
 
-/// The line of a value in the text that its module was parsed from, from 1; `None` when it has no place there.
-pub fn line_of(
+/// Where a value of a source's normal form is in its files; `None` when it has no place there.
+pub fn place_of<'s>(
     shader: &Shader,
-    text: &str,
+    source: &'s Source,
     (stage, value): (lodc_passes::Stage, naga::Handle<naga::Expression>),
-) -> Option<u32> {
-    let span = shader.function(stage)?.expressions.get_span(value);
-    span.is_defined().then(|| span.location(text).line_number)
+) -> Option<Place<'s>> {
+    source.place(shader.function(stage)?.expressions.get_span(value))
 }

@@ -1,11 +1,13 @@
 //! The report as a person sees it in a terminal: a table of levels, a table of sites.
 
-use super::{Report, line_of};
+use super::{Report, place_of};
 use crate::emit::Form;
+use crate::front::{Place, Source};
 use crate::search::Measured;
 use lodc_passes::{Candidate, Shader};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
 /// The table of levels.
 pub fn table(report: &Report) -> String {
@@ -95,7 +97,7 @@ pub fn next(report: &Report, form: Form) -> String {
 /// the best single change there saves and adds at `distance`.
 pub fn inspection(
     shader: &Shader,
-    text: &str,
+    source: &Source,
     distance: f64,
     original: &Measured,
     tried: &[(Candidate, Option<Measured>)],
@@ -107,13 +109,20 @@ pub fn inspection(
         /// Saved share of the cost, added error, and the change.
         best: Option<(f64, f64, &'a Candidate)>,
     }
-    let mut sites: BTreeMap<(u32, &str), Site<'_>> = BTreeMap::new();
+    let mut sites: BTreeMap<(usize, u32, &str), (String, Site<'_>)> = BTreeMap::new();
     for (candidate, measured) in tried {
-        let line = shader
+        let place = shader
             .find(&candidate.site)
-            .and_then(|place| line_of(shader, text, place))
-            .unwrap_or(0);
-        let site = sites.entry((line, candidate.site.path())).or_default();
+            .and_then(|at| place_of(shader, source, at));
+        let (file, line) = place.as_ref().map_or((0, 0), |p| (p.file.start, p.line()));
+        let (_, site) = sites
+            .entry((file, line, candidate.site.path()))
+            .or_insert_with(|| {
+                (
+                    place.as_ref().map_or_else(String::new, line_of),
+                    Site::default(),
+                )
+            });
         *site.passes.entry(&candidate.pass).or_default() += 1;
         let Some(measured) = measured else { continue };
         let saved = 1.0 - measured.work.total() / original.work.total();
@@ -132,7 +141,7 @@ pub fn inspection(
     }
     let mut rows =
         vec![["line", "value", "candidates", "saves", "excess", "by"].map(str::to_owned)];
-    for ((line, value), site) in sites {
+    for ((_, _, value), (line, site)) in sites {
         let passes: Vec<String> = site
             .passes
             .iter()
@@ -152,15 +161,19 @@ pub fn inspection(
             ),
             None => ("-".to_owned(), "-".to_owned(), String::new()),
         };
-        let line = if line == 0 {
-            String::new()
-        } else {
-            line.to_string()
-        };
         rows.push([line, value.to_owned(), passes.join(", "), saves, excess, by]);
     }
     let table = columns(&rows, &[false, true, true, false, false, true]);
     format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n")
+}
+
+/// A line of the shader's own file as its number, one of another file with that file's name.
+fn line_of(place: &Place<'_>) -> String {
+    let file = Path::new(place.file.name).file_name();
+    match file.filter(|_| !place.is_in_main()) {
+        Some(file) => format!("{}:{}", file.display(), place.line()),
+        None => place.line().to_string(),
+    }
 }
 
 /// A choice without the hash of the value that it names.

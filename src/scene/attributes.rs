@@ -29,7 +29,7 @@ pub(super) fn resolve(
         Some((entry, _)) => (entry, ShaderStage::Vertex),
         None => (source.fragment_entry().0, ShaderStage::Fragment),
     };
-    let inputs: Vec<(u32, Input)> = inputs(&source.module, entry, &source.text)
+    let inputs: Vec<(u32, Input)> = inputs(source, entry)
         .into_iter()
         .filter_map(|input| match input.binding {
             Binding::Location { location, .. } => Some((location, input)),

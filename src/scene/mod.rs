@@ -229,6 +229,10 @@ impl Scene {
                 hash: hash(text.as_bytes()),
             });
         }
+        inputs.extend(source.others.iter().map(|file| InputFile {
+            name: file.name.clone(),
+            hash: hash(file.text.as_bytes()),
+        }));
         let files = images.inputs.into_iter();
         inputs.extend(files.map(|(name, hash)| InputFile { name, hash }));
         let mut scene = Self {
@@ -356,7 +360,7 @@ impl Scene {
 /// mesh, what it makes of the indices of six vertices.
 fn default_object(source: &Source) -> Object {
     let reads = |entry: usize| {
-        let inputs = inputs(&source.module, entry, &source.text);
+        let inputs = inputs(source, entry);
         let mut bindings = inputs.into_iter().map(|input| input.binding);
         bindings.any(|binding| matches!(binding, Binding::Location { .. }))
     };

@@ -672,7 +672,7 @@ fn no_image(
 }
 
 /// The first line in which a texture is read by its own name.
-fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<usize> {
+fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<u32> {
     let module = &source.module;
     let functions = module.functions.iter().map(|(_, f)| f);
     let all = functions.chain(module.entry_points.iter().map(|e| &e.function));
@@ -683,9 +683,8 @@ fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<usize>
                 _ => return None,
             };
             let own = matches!(function.expressions[image], Expression::GlobalVariable(g) if g == texture);
-            let place = function.expressions.get_span(handle).to_range().filter(|_| own)?;
-            let before = source.text.get(..place.start)?;
-            Some(before.matches('\n').count() + 1)
+            let place = source.place(function.expressions.get_span(handle)).filter(|_| own)?;
+            Some(place.line())
         })
     })
     .min()
