@@ -1,7 +1,12 @@
 //! Draws a frame: rasterises once, shades as often as there are variants.
 
+mod format;
+mod light;
 #[cfg(test)]
 mod tests;
+
+pub use format::Format;
+pub use light::{Lighting, Lit, Plane};
 
 use super::image::Picture;
 use super::lane::{LANES, Words};
@@ -21,6 +26,8 @@ pub struct Shading {
     /// For each covered fragment of the coverage, in its order, the colour at location 0. Components
     /// that the program does not return are 0, alpha 1; integers are converted.
     pub colours: Vec<[f32; 4]>,
+    /// The same for further locations that were asked for, in their order.
+    pub targets: Vec<Vec<[f32; 4]>>,
     /// For each covered fragment, whether it was kept (not discarded, and its sample mask not 0).
     pub alive: Vec<bool>,
     /// For each covered fragment its depth, when the program returns one; empty otherwise.
@@ -52,7 +59,18 @@ pub fn shade_into(
     bindings: &Bindings,
     shading: &mut Shading,
 ) {
-    let interface = Interface::new(fragment, coverage);
+    shade_targets(fragment, coverage, bindings, &[], shading);
+}
+
+/// The same with what the program returns at further locations.
+fn shade_targets(
+    fragment: &Program,
+    coverage: &Coverage,
+    bindings: &Bindings,
+    targets: &[u32],
+    shading: &mut Shading,
+) {
+    let interface = Interface::new(fragment, coverage, targets);
     let depths = if interface.depth.is_some() {
         coverage.fragments
     } else {
@@ -61,6 +79,10 @@ pub fn shade_into(
     shading.colours.resize(coverage.fragments, [0.0; 4]);
     shading.alive.resize(coverage.fragments, false);
     shading.depths.resize(depths, 0.0);
+    shading.targets.resize(targets.len(), Vec::new());
+    for target in &mut shading.targets {
+        target.resize(coverage.fragments, [0.0; 4]);
+    }
 
     let mut jobs = Vec::new();
     let (mut colours, mut alive, mut depths) = (
@@ -68,12 +90,17 @@ pub fn shade_into(
         &mut shading.alive[..],
         &mut shading.depths[..],
     );
+    let mut targets: Vec<_> = shading.targets.iter_mut().map(|t| &mut t[..]).collect();
     let draws = coverage.blocks.chunk_by(|a, b| a.draw == b.draw);
     for blocks in draws.flat_map(|blocks| blocks.chunks(BLOCKS_PER_MACHINE)) {
         let count = blocks.iter().map(Block::covered_count).sum();
         jobs.push(Job {
             blocks,
             colours: colours.split_off_mut(..count).unwrap_or_default(),
+            targets: targets
+                .iter_mut()
+                .map(|target| target.split_off_mut(..count).unwrap_or_default())
+                .collect(),
             alive: alive.split_off_mut(..count).unwrap_or_default(),
             depths: depths.split_off_mut(..count).unwrap_or_default(),
         });
@@ -182,8 +209,10 @@ struct Interface {
     inputs: Option<Vec<Option<usize>>>,
     /// How many outputs there are.
     outputs: usize,
-    /// The outputs that are the colour, with their component and kind.
-    colour: Vec<(usize, usize, ScalarKind)>,
+    /// The outputs that are the colour.
+    colour: Vec<Component>,
+    /// The same for each further location.
+    targets: Vec<Vec<Component>>,
     /// The output that is the depth.
     depth: Option<usize>,
     /// The output that is the sample mask.
@@ -191,7 +220,7 @@ struct Interface {
 }
 
 impl Interface {
-    fn new(program: &Program, coverage: &Coverage) -> Self {
+    fn new(program: &Program, coverage: &Coverage, targets: &[u32]) -> Self {
         let same = |a: &Slot, b: &Slot| {
             a.component == b.component
                 && match (&a.binding, &b.binding) {
@@ -219,20 +248,10 @@ impl Interface {
         Self {
             inputs: (!identical).then_some(found),
             outputs: outputs.len(),
-            colour: outputs
+            colour: components(outputs, 0),
+            targets: targets
                 .iter()
-                .enumerate()
-                .filter(|(_, slot)| {
-                    matches!(
-                        slot.binding,
-                        Binding::Location {
-                            location: 0,
-                            blend_src: None | Some(0),
-                            ..
-                        }
-                    )
-                })
-                .map(|(i, slot)| (i, slot.component, slot.kind))
+                .map(|location| components(outputs, *location))
                 .collect(),
             depth: built_in(BuiltIn::FragDepth),
             sample_mask: built_in(BuiltIn::SampleMask),
@@ -240,16 +259,51 @@ impl Interface {
     }
 }
 
+/// One component of a colour: the output that it is, its place in the colour, what its word holds.
+type Component = (usize, usize, ScalarKind);
+
+/// The components of the colour at a location.
+fn components(outputs: &[Slot], wanted: u32) -> Vec<Component> {
+    let all = outputs.iter().enumerate();
+    let own = all.filter(|(_, slot)| {
+        matches!(
+            slot.binding,
+            Binding::Location {
+                location,
+                blend_src: None | Some(0),
+                ..
+            } if location == wanted
+        )
+    });
+    own.map(|(i, slot)| (i, slot.component, slot.kind))
+        .collect()
+}
+
+/// The colour that a lane returned.
+fn colour(components: &[Component], outputs: &[Words], lane: usize) -> [f32; 4] {
+    let mut colour = [0.0, 0.0, 0.0, 1.0];
+    for &(output, component, kind) in components {
+        let word = outputs[output][lane];
+        colour[component & 3] = match kind {
+            ScalarKind::Uint | ScalarKind::Bool => word as f32,
+            ScalarKind::Sint => word.cast_signed() as f32,
+            _ => f32::from_bits(word),
+        };
+    }
+    colour
+}
+
 /// The blocks of one machine, all of one draw, and where their results go.
 struct Job<'a> {
     blocks: &'a [Block],
     colours: &'a mut [[f32; 4]],
+    targets: Vec<&'a mut [[f32; 4]]>,
     alive: &'a mut [bool],
     depths: &'a mut [f32],
 }
 
 impl Job<'_> {
-    fn run(self, program: &Program, bindings: &Bindings, interface: &Interface) -> Profile {
+    fn run(mut self, program: &Program, bindings: &Bindings, interface: &Interface) -> Profile {
         let draw = self.blocks.first().map_or(0, |block| block.draw);
         let mut machine = Machine::of_draw(program, bindings, draw);
         let mut outputs = vec![[0; LANES]; interface.outputs];
@@ -272,16 +326,10 @@ impl Job<'_> {
             };
             let kept = machine.run(inputs, block.active, block.covered, &mut outputs);
             for lane in block.covered.lanes() {
-                let mut colour = [0.0, 0.0, 0.0, 1.0];
-                for &(output, component, kind) in &interface.colour {
-                    let word = outputs[output][lane];
-                    colour[component & 3] = match kind {
-                        ScalarKind::Uint | ScalarKind::Bool => word as f32,
-                        ScalarKind::Sint => word.cast_signed() as f32,
-                        _ => f32::from_bits(word),
-                    };
+                self.colours[fragment] = colour(&interface.colour, &outputs, lane);
+                for (target, components) in self.targets.iter_mut().zip(&interface.targets) {
+                    target[fragment] = colour(components, &outputs, lane);
                 }
-                self.colours[fragment] = colour;
                 self.alive[fragment] = kept.0[lane / 64] >> (lane % 64) & 1 == 1
                     && interface
                         .sample_mask
