@@ -328,7 +328,7 @@ pub fn inspect(request: &Request) -> Result<String> {
         &ready.base,
         &ready.source,
         distance,
-        set.original(),
+        &set.original(),
         &tried,
     ))
 }

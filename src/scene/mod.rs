@@ -69,6 +69,8 @@ pub struct Scene {
     pub nearest: f64,
     /// The farthest distance, where the error may be `e_max`.
     pub farthest: f64,
+    /// How many offsets within a pixel errors are measured at.
+    pub offsets: usize,
     /// What the shader returns.
     pub output: Output,
     /// Unit vectors from the sphere's centre to the eye.
@@ -249,6 +251,7 @@ impl Scene {
             distances: settings.distances,
             nearest: settings.nearest,
             farthest: settings.farthest,
+            offsets: settings.offsets,
             output: settings.output,
             views: settings.views,
             uniforms,

@@ -46,6 +46,10 @@ const LARGEST: i64 = MAX_EDGE as i64 / 4;
 /// The most levels, views and pictures; more is a slip of the finger.
 const MOST_LEVELS: i64 = 64;
 const MOST_VIEWS: usize = 256;
+const MOST_OFFSETS: i64 = 64;
+
+/// How many offsets within a pixel errors are measured at when the file does not say.
+const OFFSETS: i64 = 4;
 
 /// The nearest and farthest distance when the file does not say, in radii of the object.
 const NEAREST: f64 = 2.0;
@@ -66,6 +70,7 @@ pub(super) struct Settings {
     pub(super) distances: Vec<f64>,
     pub(super) nearest: f64,
     pub(super) farthest: f64,
+    pub(super) offsets: usize,
     pub(super) output: Output,
     pub(super) views: Vec<DVec3>,
     pub(super) warnings: Vec<Diagnostic>,
@@ -169,6 +174,7 @@ impl Settings {
             distances: autolod::distances(nearest, farthest, levels as usize),
             nearest,
             farthest,
+            offsets: whole("offsets", &file.offsets, OFFSETS, 1, MOST_OFFSETS)? as usize,
             output: read_output(toml, file)?,
             views: read_views(toml, file, object)?,
             warnings,

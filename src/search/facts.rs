@@ -26,9 +26,10 @@ impl SampleSet<'_> {
         let profiles: Vec<_> = self
             .frames
             .par_iter()
-            .map(|frame| {
+            .flat_map_iter(|frame| frame.drawings.iter().map(move |drawing| (frame, drawing)))
+            .map(|(frame, drawing)| {
                 let mut shading = Shading::default();
-                let seen = frame.seen.as_ref().unwrap_or(&frame.coverage);
+                let seen = drawing.seen.as_ref().unwrap_or(&drawing.coverage);
                 shade_into(&program, seen, &frame.bindings, &mut shading);
                 shading.profile.probes
             })

@@ -9,6 +9,8 @@ pub struct Seen {
     pub recipe: Recipe,
     /// `E^2` on the search set.
     pub square: f64,
+    /// How much of its bound it uses up there; feasible when at most 1.
+    pub strain: f64,
     /// Executed work of a covered fragment.
     pub work: Work,
 }
@@ -58,6 +60,7 @@ mod tests {
         Seen {
             recipe: Recipe::default(),
             square,
+            strain: 0.0,
             work: Work {
                 simple: cost,
                 ..Work::default()

@@ -48,6 +48,7 @@ impl Variant {
         Seen {
             recipe: self.recipe.clone(),
             square: self.measured.error.square(),
+            strain: self.measured.strain,
             work: self.measured.work,
         }
     }
@@ -91,10 +92,8 @@ pub(crate) struct Prices(BTreeMap<Key, Option<Price>>);
 
 /// What one greedy descent is told.
 pub(crate) struct Descent<'a> {
-    /// The samples that it is judged on.
+    /// The samples that it is judged on, within their bound.
     pub(crate) set: &'a SampleSet<'a>,
-    /// The largest `E^2` that a step may lead to.
-    pub(crate) limit: f64,
     /// Told how many variants have been measured, and the cost of the current one as a share of the
     /// original's.
     pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
@@ -231,9 +230,10 @@ impl Step<'_> {
                 frontier.add(Seen {
                     recipe,
                     square: measured.error.square(),
+                    strain: measured.strain,
                     work: measured.work,
                 });
-                if measured.error.square() > descent.limit {
+                if measured.strain > 1.0 {
                     over.insert(self.keys[i].clone());
                 }
             }

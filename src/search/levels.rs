@@ -94,11 +94,7 @@ pub fn find(
         distance,
         recipe: Recipe::default(),
         shader: stand.base.clone(),
-        error: ErrorFigures::new(
-            &set.original().error,
-            &set.original().error,
-            scene.bound(distance),
-        ),
+        error: set.floor(),
         work: set.original().work,
         cost: 1.0,
         error_after: Vec::new(),
@@ -110,11 +106,8 @@ pub fn find(
     let mut variants = 0;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
         let search = SampleSet::new(stand, distance, Samples::Search)?;
-        let bound = scene.bound(distance);
-        let limit = search.original().error.square() + bound * bound;
         let descent = Descent {
             set: &search,
-            limit,
             progress: &|measured, share| {
                 progress(Progress {
                     distance: at,
@@ -128,7 +121,7 @@ pub fn find(
         let before = &levels[levels.len() - 1];
         let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())
             .ok()
-            .filter(|variant| variant.measured.error.square() <= limit)
+            .filter(|variant| variant.measured.strain <= 1.0)
             .unwrap_or_else(|| base.clone());
         let mut frontier = Frontier::default();
         frontier.add(base.seen());
@@ -136,7 +129,7 @@ pub fn find(
         let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
         let interval = [distance, (distance * next).sqrt(), next];
         let checks = |samples| {
-            let check = |distance| Check::new(stand, distance, samples);
+            let check = |distance| SampleSet::new(stand, distance, samples);
             interval
                 .into_iter()
                 .map(check)
@@ -146,7 +139,7 @@ pub fn find(
         let feasible: Vec<&Seen> = frontier
             .members()
             .iter()
-            .filter(|member| member.square <= limit && passes_all(stand, member, &quick))
+            .filter(|member| member.strain <= 1.0 && passes_all(stand, member, &quick))
             .collect();
         let checks = checks(Samples::Full)?;
         if let Some(level) = cheapest_confirmed(stand, &feasible, &checks) {
@@ -178,46 +171,27 @@ fn threshold(scene: &Scene, distance: f64) -> f64 {
 }
 
 /// Whether a member is within the bound at every distance.
-fn passes_all(stand: &Stand<'_>, member: &Seen, checks: &[Check<'_>]) -> bool {
+fn passes_all(stand: &Stand<'_>, member: &Seen, checks: &[SampleSet<'_>]) -> bool {
     member.recipe.replay(stand.base).is_ok_and(|shader| {
-        let passes = |check: &Check<'_>| check.set.measure(&shader).is_ok_and(|m| check.passes(&m));
+        let passes = |set: &SampleSet<'_>| set.measure(&shader).is_ok_and(|m| m.strain <= 1.0);
         checks.iter().all(passes)
     })
 }
 
-/// Samples at one distance of a level's interval, and the bound there.
-struct Check<'a> {
-    set: SampleSet<'a>,
-    bound: f64,
-}
-
-impl<'a> Check<'a> {
-    fn new(
-        stand: &'a Stand<'a>,
-        distance: f64,
-        samples: Samples,
-    ) -> std::result::Result<Self, Refused> {
-        Ok(Self {
-            set: SampleSet::new(stand, distance, samples)?,
-            bound: stand.scene.bound(distance),
-        })
-    }
-
-    fn passes(&self, measured: &Measured) -> bool {
-        measured.error.square() <= self.set.original().error.square() + self.bound * self.bound
-    }
-}
-
 /// The cheapest member that every check passes. Error falls as cost rises along a frontier, so the place is
 /// found by bisection, and then confirmed upwards.
-fn cheapest_confirmed(stand: &Stand<'_>, members: &[&Seen], checks: &[Check<'_>]) -> Option<Level> {
+fn cheapest_confirmed(
+    stand: &Stand<'_>,
+    members: &[&Seen],
+    checks: &[SampleSet<'_>],
+) -> Option<Level> {
     let judge = |member: &Seen| -> Option<Measured> {
         let shader = member.recipe.replay(stand.base).ok()?;
         shader.validate().ok()?;
         let mut first = None;
         for check in checks {
-            let measured = check.set.measure(&shader).ok()?;
-            if !check.passes(&measured) {
+            let measured = check.measure(&shader).ok()?;
+            if measured.strain > 1.0 {
                 return None;
             }
             first.get_or_insert(measured);
@@ -238,16 +212,17 @@ fn cheapest_confirmed(stand: &Stand<'_>, members: &[&Seen], checks: &[Check<'_>]
     }
     let (member, measured) = best?;
     let start = &checks[0];
-    let distance = start.set.distance();
+    let distance = start.distance();
     let recipe = minimal(stand.base, &member.recipe);
+    let shader = recipe.replay(stand.base).ok()?;
     Some(Level {
         autolod: threshold(stand.scene, distance),
         distance,
-        shader: recipe.replay(stand.base).ok()?,
-        error: ErrorFigures::new(&measured.error, &start.set.original().error, start.bound),
+        error: start.figures(&shader).ok()?,
+        shader,
         work: measured.work,
-        cost: measured.work.total() / start.set.original().work.total(),
-        error_after: error_after(stand, &recipe, &start.set),
+        cost: measured.work.total() / start.original().work.total(),
+        error_after: error_after(stand, &recipe, start),
         recipe,
     })
 }

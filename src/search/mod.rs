@@ -11,12 +11,13 @@
 
 pub mod error;
 mod facts;
+mod frame;
 pub mod frontier;
 mod greedy;
 pub mod levels;
 pub mod samples;
 
-pub use error::{ErrorFigures, ErrorSum};
+pub use error::{Details, ErrorFigures, ErrorSum};
 pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;

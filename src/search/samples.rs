@@ -1,19 +1,14 @@
 //! What errors are measured over: the frames of a scene at one distance, rasterised once, with the pixels of
 //! the reference beside them. A variant is then one run of its fragment program.
 
-use super::error::{ErrorSum, ReferencePixel, displayed, encoded};
-use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
-use crate::eval::machine::Bindings;
+use super::error::{Details, ErrorFigures, ErrorSum};
+use super::frame::{Rasterised, mix};
 use crate::eval::program::{Program, Refused};
-use crate::eval::raster::{Coverage, rasterize};
-use crate::scene::{Output, Scene};
+use crate::scene::Scene;
 use lodc_passes::{Shader, Stage, Work};
 use naga::{Expression, Handle};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 
-/// Fine pixels of the reference to a pixel, along each axis.
-const GRID: u32 = 4;
 /// Squares of 2 x 2 pixels that a search set has, over all of its frames; a frame has at least one block full.
 const SEARCH_SQUARES: usize = 1024;
 
@@ -30,9 +25,10 @@ pub struct Stand<'a> {
 /// Which samples of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Samples {
-    /// A part that is quick to shade: squares of pixels spread evenly over every frame.
+    /// A part that is quick to shade: squares of pixels spread evenly over every frame, each frame at one of the
+    /// offsets in turn.
     Search,
-    /// All of them.
+    /// All of them: every pixel of every frame at every offset.
     Full,
 }
 
@@ -41,6 +37,8 @@ pub enum Samples {
 pub struct Measured {
     /// Its error against the reference.
     pub error: ErrorSum,
+    /// How much of its bound it uses up at this distance; feasible when at most 1 (see [`ErrorFigures::strain`]).
+    pub strain: f64,
     /// Executed work of a covered fragment.
     pub work: Work,
 }
@@ -50,21 +48,7 @@ pub struct SampleSet<'a> {
     pub(super) stand: &'a Stand<'a>,
     distance: f64,
     pub(super) frames: Vec<Rasterised>,
-    original: Measured,
-}
-
-/// One frame, rasterised, with the reference's pixels.
-pub(super) struct Rasterised {
-    pub(super) bindings: Bindings,
-    pub(super) coverage: Coverage,
-    /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
-    pub(super) seen: Option<Coverage>,
-    /// The pixels that the reference or a fragment covers.
-    reference: Vec<ReferencePixel>,
-    /// For each covered fragment, its place in `reference`.
-    places: Vec<u32>,
-    /// The reference's coverage, in pixels.
-    covered: f64,
+    original: (Details, Work),
 }
 
 impl<'a> SampleSet<'a> {
@@ -74,39 +58,33 @@ impl<'a> SampleSet<'a> {
     /// When the evaluator refuses the original.
     pub fn new(stand: &'a Stand<'a>, distance: f64, samples: Samples) -> Result<Self, Refused> {
         let original = compile(stand.base, &[])?;
-        let frames = stand.scene.frames(distance);
-        let squares = match samples {
+        let scene = stand.scene;
+        let frames = scene.frames(distance);
+        let offsets = offsets(scene.offsets, scene.seed);
+        let most = match samples {
             Samples::Full => usize::MAX,
             Samples::Search => (SEARCH_SQUARES / frames.len().max(1)).max(64),
         };
-        let output = stand.scene.output;
         let frames = frames
             .into_par_iter()
             .enumerate()
             .map(|(index, frame)| {
-                let mut coverage = rasterize(stand.vertex, &original, &frame);
-                let mut fine = frame;
-                fine.grid = GRID;
-                let mut reference = rasterize(stand.vertex, &original, &fine);
-                let all = coverage.squares();
-                if all.len() > squares {
-                    let kept = choose(&all, squares, stand.scene.seed.wrapping_add(index as u64));
-                    coverage = coverage.part(|square| kept.contains(&square));
-                    reference = reference.part(|square| kept.contains(&square));
-                }
-                Rasterised::new(&original, coverage, &reference, fine.bindings, output)
+                let offsets = match samples {
+                    Samples::Full => &offsets[..],
+                    Samples::Search => std::slice::from_ref(&offsets[index % offsets.len()]),
+                };
+                let view = index / scene.uniform_samples().max(1);
+                let seed = scene.seed.wrapping_add(index as u64);
+                Rasterised::new(stand, &original, (view, frame), offsets, (most, seed))
             })
             .collect();
         let mut set = Self {
             stand,
             distance,
             frames,
-            original: Measured {
-                error: ErrorSum::default(),
-                work: Work::default(),
-            },
+            original: Default::default(),
         };
-        set.original = set.measure_program(&original);
+        set.original = set.details(&original);
         Ok(set)
     }
 
@@ -116,8 +94,13 @@ impl<'a> SampleSet<'a> {
     }
 
     /// What was measured of the original: the floor.
-    pub fn original(&self) -> &Measured {
-        &self.original
+    pub fn original(&self) -> Measured {
+        self.judge(&self.original)
+    }
+
+    /// All error figures of the original.
+    pub fn floor(&self) -> ErrorFigures {
+        self.figures_of(&self.original.0)
     }
 
     /// Measures a variant.
@@ -130,104 +113,47 @@ impl<'a> SampleSet<'a> {
 
     /// Measures any fragment program with the original's interface.
     pub fn measure_program(&self, fragment: &Program) -> Measured {
+        self.judge(&self.details(fragment))
+    }
+
+    /// All error figures of a variant, against the original's and the bound at this distance.
+    ///
+    /// # Errors
+    /// When the evaluator refuses it.
+    pub fn figures(&self, shader: &Shader) -> Result<ErrorFigures, Refused> {
+        let (details, _) = self.details(&compile(shader, &[])?);
+        Ok(self.figures_of(&details))
+    }
+
+    fn figures_of(&self, details: &Details) -> ErrorFigures {
+        let bound = self.stand.scene.bound(self.distance);
+        ErrorFigures::new(details, &self.original.0, bound)
+    }
+
+    fn judge(&self, (details, work): &(Details, Work)) -> Measured {
+        Measured {
+            error: details.error,
+            strain: self.figures_of(details).strain(),
+            work: *work,
+        }
+    }
+
+    /// Draws every frame at every offset.
+    fn details(&self, fragment: &Program) -> (Details, Work) {
         let output = self.stand.scene.output;
-        let results: Vec<(ErrorSum, u64, Work)> = self
+        let results: Vec<_> = self
             .frames
             .par_iter()
-            .map(|frame| {
-                let mut shading = Shading::default();
-                shade_into(fragment, &frame.coverage, &frame.bindings, &mut shading);
-                let error = frame.error(&shading, output);
-                (error, shading.profile.lanes, shading.profile.work)
-            })
+            .map(|frame| (frame.view(), frame.measure(fragment, output)))
             .collect();
-        let mut error = ErrorSum::default();
         let mut lanes = 0;
         let mut work = Work::default();
-        for (sum, count, executed) in results {
-            error.merge(&sum);
-            lanes += count;
-            work += executed;
+        for profile in results.iter().flat_map(|(_, (_, profile))| profile) {
+            lanes += profile.lanes;
+            work += profile.work;
         }
-        Measured {
-            error,
-            work: work * (1.0 / lanes.max(1) as f64),
-        }
-    }
-}
-
-impl Rasterised {
-    fn new(
-        original: &Program,
-        coverage: Coverage,
-        fine: &Coverage,
-        bindings: Bindings,
-        output: Output,
-    ) -> Self {
-        let mut shading = Shading::default();
-        shade_into(original, fine, &bindings, &mut shading);
-        let mut picture = resolve(fine, &shading);
-        for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
-            if *covered > 0.0 {
-                let [r, g, b] = displayed(output, *colour);
-                *colour = [r, g, b, 1.0];
-            }
-        }
-        let picture = picture.box_filtered(fine.grid);
-        let mut pixels: Vec<u32> = (0..)
-            .zip(&picture.covered)
-            .filter(|(_, c)| **c > 0.0)
-            .map(|(i, _)| i)
-            .collect();
-        pixels.extend(coverage.pixels());
-        pixels.sort_unstable();
-        pixels.dedup();
-        let mut places = vec![0; coverage.fragments];
-        for (fragment, pixel) in coverage.pixels().enumerate() {
-            // Every covered pixel has been entered above.
-            places[fragment] = pixels.binary_search(&pixel).unwrap_or(0) as u32;
-        }
-        let covered = |pixel: &u32| picture.covered[*pixel as usize];
-        Self {
-            covered: pixels.iter().map(|pixel| f64::from(covered(pixel))).sum(),
-            reference: pixels
-                .iter()
-                .map(|pixel| {
-                    let [r, g, b, _] = picture.pixels[*pixel as usize];
-                    ReferencePixel::new([r, g, b], covered(pixel))
-                })
-                .collect(),
-            seen: coverage.late.then(|| {
-                shade_into(original, &coverage, &bindings, &mut shading);
-                seen(&coverage, &shading)
-            }),
-            places,
-            bindings,
-            coverage,
-        }
-    }
-
-    fn error(&self, shading: &Shading, output: Output) -> ErrorSum {
-        let mut colours: Vec<Option<[f32; 3]>> = vec![None; self.reference.len()];
-        each_visible(
-            &self.coverage,
-            shading,
-            colours.len(),
-            |fragment, _| self.places[fragment],
-            |place, fragment| {
-                colours[place as usize] = Some(encoded(output, shading.colours[fragment]));
-            },
-        );
-        let mut sum = ErrorSum {
-            coverage: self.covered,
-            ..ErrorSum::default()
-        };
-        for (pixel, colour) in self.reference.iter().zip(colours) {
-            let (square, largest) = pixel.difference(colour);
-            sum.squares += square;
-            sum.max = sum.max.max(largest);
-        }
-        sum
+        let frames = results.into_iter().map(|(view, (error, _))| (view, error));
+        (Details::new(frames), work * (1.0 / lanes.max(1) as f64))
     }
 }
 
@@ -237,29 +163,53 @@ pub(super) fn compile(shader: &Shader, probes: &[Handle<Expression>]) -> Result<
     Program::compile(shader.module(), entry, probes)
 }
 
-/// Some of the squares, `count` of them, spread evenly: sorted by a hash of their place and the seed.
-fn choose(all: &[(u32, u32)], count: usize, seed: u64) -> BTreeSet<(u32, u32)> {
-    let mut order: Vec<(u64, (u32, u32))> = all
-        .iter()
-        .map(|square| {
-            (
-                mix(seed ^ mix(u64::from(square.0) << 32 | u64::from(square.1))),
-                *square,
-            )
+/// Where in a pixel pictures are sampled, from its centre, in pixels, -0.5..0.5: `count` points spread evenly over
+/// the pixel, the same always for a seed. One alone is the centre.
+///
+/// The points are multiples of the plastic number's powers, which stay far from each other however many they are
+/// (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018), shifted by the seed.
+pub(crate) fn offsets(count: usize, seed: u64) -> Vec<[f32; 2]> {
+    if count <= 1 {
+        return vec![[0.0; 2]];
+    }
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+    let unit = |word: u64| (word >> 11) as f64 / (1u64 << 53) as f64;
+    let shift = [unit(mix(seed)), unit(mix(mix(seed)))];
+    (0..count)
+        .map(|i| {
+            [0, 1].map(|axis| {
+                let at = shift[axis] + STEP[axis] * i as f64;
+                (at - at.floor() - 0.5) as f32
+            })
         })
-        .collect();
-    order.sort_unstable();
-    order
-        .into_iter()
-        .take(count)
-        .map(|(_, square)| square)
         .collect()
 }
 
-/// SplitMix64's finaliser (Steele, Lea, Flood 2014): a hash of one word.
-fn mix(word: u64) -> u64 {
-    let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    word ^ word >> 31
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_are_spread_over_the_pixel_and_repeat() {
+        assert_eq!(offsets(1, 7), [[0.0, 0.0]]);
+        for seed in 0..50 {
+            let four = offsets(4, seed);
+            assert_eq!(four, offsets(4, seed));
+            assert_eq!(four, offsets(9, seed)[..4]);
+            let inside = |x: &f32| (-0.5..=0.5).contains(x);
+            assert!(four.as_flattened().iter().all(inside), "{four:?}");
+            // Around the edge too: the pattern repeats from pixel to pixel.
+            let apart = |a: f32, b: f32| {
+                let d = (a - b).abs();
+                d.min(1.0 - d)
+            };
+            for (i, a) in four.iter().enumerate() {
+                for b in &four[..i] {
+                    let distance = apart(a[0], b[0]).hypot(apart(a[1], b[1]));
+                    assert!(distance > 0.3, "{seed}: {a:?} {b:?}");
+                }
+            }
+        }
+        assert_ne!(offsets(4, 1), offsets(4, 2));
+    }
 }

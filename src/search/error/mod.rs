@@ -1,0 +1,24 @@
+//! The error of pictures against the reference: DESIGN's `E`, with its constants stated.
+//!
+//! ```text
+//! fragment --display--> what a display shows of it
+//! 4 x 4 fine pixels --pixel--> ReferencePixel      what it should show
+//! reference x drawings --tally--> FrameError       one frame: sums, tiles, shimmer
+//! [FrameError] x [FrameError] --figures--> ErrorFigures    a level against the original and the bound
+//! ```
+//!
+//! Colours are compared as a display shows them: sRGB-encoded, clamped to 0..1, premultiplied with
+//! coverage, as the mean over a black and a white background and three channels. The sum runs over
+//! the pixels that the reference or the picture covers, and is divided by the reference's coverage.
+//! This is eq. 6 of Liang 2022; the RMSE is its root.
+
+mod display;
+mod figures;
+mod pixel;
+mod tally;
+
+pub(crate) use display::{displayed, encoded};
+pub use figures::{Details, ErrorFigures};
+pub(crate) use pixel::ReferencePixel;
+pub use tally::ErrorSum;
+pub(crate) use tally::{FrameError, Reference, Tally};

@@ -1,0 +1,163 @@
+//! One frame's differences added up: over all pixels, by tile, and from offset to offset.
+
+use super::ReferencePixel;
+use std::collections::BTreeMap;
+
+/// Edge of a tile in pixels.
+pub(crate) const TILE: u32 = 8;
+
+/// The least coverage that a tile is judged by, in pixels: a quarter of it. Below that a sliver of the silhouette,
+/// a pixel or two, would decide.
+const LEAST_OF_TILE: f64 = (TILE * TILE / 4) as f64;
+
+/// Error sums over a set of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorSum {
+    /// Sum of squared differences, each the mean over backgrounds and channels.
+    pub squares: f64,
+    /// Sum of the reference's coverage, in pixels, once for each offset.
+    pub coverage: f64,
+    /// The largest difference of one channel of one pixel, 0..1.
+    pub max: f32,
+}
+
+impl ErrorSum {
+    /// `E^2`: the mean squared difference. 0 when nothing is covered.
+    pub fn square(&self) -> f64 {
+        if self.coverage > 0.0 {
+            self.squares / self.coverage
+        } else {
+            0.0
+        }
+    }
+
+    /// Adds the sums of another part of the samples.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.squares += other.squares;
+        self.coverage += other.coverage;
+        self.max = self.max.max(other.max);
+    }
+}
+
+/// The pixels of the reference that are looked at, in a fixed order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reference {
+    pixels: Vec<ReferencePixel>,
+    /// The reference's coverage, in pixels.
+    coverage: f64,
+    /// For each pixel, its tile, counted from 0 in the order of the tiles.
+    tiles: Vec<u32>,
+    /// Each tile's coverage by the reference, in pixels.
+    tile_coverage: Vec<f64>,
+}
+
+impl Reference {
+    /// From each pixel's place, the mean of its samples' displayed colours, premultiplied, and its covered share.
+    pub(crate) fn new(pixels: impl IntoIterator<Item = ([u32; 2], [f32; 3], f32)>) -> Self {
+        let mut reference = Self::default();
+        let mut found = BTreeMap::new();
+        let mut places = Vec::new();
+        for ([x, y], mean, coverage) in pixels {
+            reference.pixels.push(ReferencePixel::new(mean, coverage));
+            reference.coverage += f64::from(coverage);
+            let tile = (y / TILE, x / TILE);
+            *found.entry(tile).or_insert(0.0) += f64::from(coverage);
+            places.push(tile);
+        }
+        let numbers: BTreeMap<_, u32> = found.keys().copied().zip(0..).collect();
+        reference.tiles = places.iter().map(|tile| numbers[tile]).collect();
+        reference.tile_coverage = found.into_values().collect();
+        reference
+    }
+
+    /// How many pixels it has.
+    pub(crate) fn len(&self) -> usize {
+        self.pixels.len()
+    }
+}
+
+/// What was measured of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct FrameError {
+    /// Over all of its pixels and offsets.
+    pub(crate) sum: ErrorSum,
+    /// For each tile, `E^2` over its pixels and offsets.
+    pub(crate) tiles: Vec<f64>,
+    /// Sum over pixels of the variance from offset to offset, each the mean over backgrounds and channels.
+    pub(crate) variance: f64,
+    /// The reference's coverage in pixels, counted once: what `variance` is divided by.
+    pub(crate) coverage: f64,
+}
+
+/// Adds up the drawings of one frame, one for each offset.
+pub(crate) struct Tally<'a> {
+    reference: &'a Reference,
+    drawings: u32,
+    max: f32,
+    /// For each pixel, the sum over drawings of the mean squared difference.
+    squares: Vec<f64>,
+    /// For each pixel, the sums over drawings of its differences.
+    sums: Vec<[f64; 6]>,
+}
+
+impl<'a> Tally<'a> {
+    /// Of no drawing yet.
+    pub(crate) fn new(reference: &'a Reference) -> Self {
+        Self {
+            reference,
+            drawings: 0,
+            max: 0.0,
+            squares: vec![0.0; reference.len()],
+            sums: vec![[0.0; 6]; reference.len()],
+        }
+    }
+
+    /// Adds a drawing: for each pixel of the reference its encoded colour, `None` where it is not covered.
+    pub(crate) fn add(&mut self, colours: &[Option<[f32; 3]>]) {
+        self.drawings += 1;
+        let totals = self.squares.iter_mut().zip(&mut self.sums);
+        for ((pixel, colour), (square, sums)) in
+            self.reference.pixels.iter().zip(colours).zip(totals)
+        {
+            let mut six = 0.0;
+            for (difference, sum) in pixel.difference(*colour).into_iter().zip(sums) {
+                let difference64 = f64::from(difference);
+                six += difference64 * difference64;
+                *sum += difference64;
+                self.max = self.max.max(difference.abs());
+            }
+            *square += six / 6.0;
+        }
+    }
+
+    /// What all drawings together show.
+    pub(crate) fn finish(self) -> FrameError {
+        let drawings = f64::from(self.drawings);
+        let reference = self.reference;
+        let mut tiles = vec![0.0; reference.tile_coverage.len()];
+        let mut variance = 0.0;
+        let mut squares = 0.0;
+        for ((square, sums), tile) in self.squares.iter().zip(&self.sums).zip(&reference.tiles) {
+            squares += square;
+            tiles[*tile as usize] += square;
+            if self.drawings > 1 {
+                // The reference is the same for each drawing, so that the differences vary as the colours do.
+                let of_mean = sums.iter().map(|sum| sum * sum).sum::<f64>() / (6.0 * drawings);
+                variance += (square - of_mean).max(0.0) / (drawings - 1.0);
+            }
+        }
+        for (tile, coverage) in tiles.iter_mut().zip(&reference.tile_coverage) {
+            *tile /= coverage.max(LEAST_OF_TILE) * drawings.max(1.0);
+        }
+        FrameError {
+            sum: ErrorSum {
+                squares,
+                coverage: reference.coverage * drawings,
+                max: self.max,
+            },
+            tiles,
+            variance,
+            coverage: reference.coverage,
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it.
+
+use super::error::{FrameError, Reference, Tally, displayed, encoded};
+use super::samples::Stand;
+use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
+use crate::eval::machine::{Bindings, Profile};
+use crate::eval::program::Program;
+use crate::eval::raster::{Coverage, Frame, rasterize};
+use crate::scene::Output;
+use std::collections::BTreeSet;
+
+/// Fine pixels of the reference to a pixel, along each axis.
+const GRID: u32 = 4;
+
+/// A frame, rasterised.
+pub(super) struct Rasterised {
+    /// Which of the scene's views it is, from 0.
+    view: usize,
+    pub(super) bindings: Bindings,
+    /// One for each offset.
+    pub(super) drawings: Vec<Drawing>,
+    /// The pixels that the reference or a fragment covers.
+    reference: Reference,
+}
+
+/// A frame rasterised at one offset.
+pub(super) struct Drawing {
+    pub(super) coverage: Coverage,
+    /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
+    pub(super) seen: Option<Coverage>,
+    /// For each covered fragment, its place in the reference.
+    places: Vec<u32>,
+}
+
+impl Rasterised {
+    /// Rasterises a frame at each offset, and draws its reference: the original, 4 x 4 samples a pixel. Of more
+    /// than `most` squares of pixels some are chosen, by the seed.
+    pub(super) fn new(
+        stand: &Stand<'_>,
+        original: &Program,
+        (view, frame): (usize, Frame),
+        offsets: &[[f32; 2]],
+        (most, seed): (usize, u64),
+    ) -> Self {
+        let mut fine = frame;
+        let mut coverages: Vec<Coverage> = offsets
+            .iter()
+            .map(|offset| {
+                fine.offset = *offset;
+                rasterize(stand.vertex, original, &fine)
+            })
+            .collect();
+        fine.offset = [0.0; 2];
+        fine.grid = GRID;
+        let mut reference = rasterize(stand.vertex, original, &fine);
+        let mut squares: Vec<_> = coverages.iter().flat_map(Coverage::squares).collect();
+        squares.extend(reference.squares());
+        squares.sort_unstable();
+        squares.dedup();
+        if squares.len() > most {
+            let kept = choose(&squares, most, seed);
+            let part = |coverage: &Coverage| coverage.part(|square| kept.contains(&square));
+            coverages = coverages.iter().map(part).collect();
+            reference = part(&reference);
+        }
+        let output = stand.scene.output;
+        let bindings = fine.bindings;
+        let (reference, pixels) =
+            draw_reference(original, &reference, &coverages, &bindings, output);
+        let drawings = coverages
+            .into_iter()
+            .map(|coverage| Drawing::new(original, coverage, &pixels, &bindings))
+            .collect();
+        Self {
+            view,
+            bindings,
+            drawings,
+            reference,
+        }
+    }
+
+    /// Which of the scene's views it is.
+    pub(super) fn view(&self) -> usize {
+        self.view
+    }
+
+    /// Draws a program at every offset and compares with the reference.
+    pub(super) fn measure(
+        &self,
+        program: &Program,
+        output: Output,
+    ) -> (FrameError, Option<Profile>) {
+        let mut shading = Shading::default();
+        let mut profile: Option<Profile> = None;
+        let mut tally = Tally::new(&self.reference);
+        for drawing in &self.drawings {
+            shade_into(program, &drawing.coverage, &self.bindings, &mut shading);
+            tally.add(&drawing.colours(&shading, self.reference.len(), output));
+            match &mut profile {
+                Some(profile) => profile.absorb(&shading.profile),
+                None => profile = Some(shading.profile.clone()),
+            }
+        }
+        (tally.finish(), profile)
+    }
+}
+
+/// The pixels that the reference or a fragment covers, and the place of each in the picture, `y * width + x`, sorted.
+fn draw_reference(
+    original: &Program,
+    fine: &Coverage,
+    coverages: &[Coverage],
+    bindings: &Bindings,
+    output: Output,
+) -> (Reference, Vec<u32>) {
+    let mut shading = Shading::default();
+    shade_into(original, fine, bindings, &mut shading);
+    let mut picture = resolve(fine, &shading);
+    for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
+        if *covered > 0.0 {
+            let [r, g, b] = displayed(output, *colour);
+            *colour = [r, g, b, 1.0];
+        }
+    }
+    let picture = picture.box_filtered(fine.grid);
+    let mut pixels: Vec<u32> = (0..)
+        .zip(&picture.covered)
+        .filter(|(_, c)| **c > 0.0)
+        .map(|(i, _)| i)
+        .collect();
+    pixels.extend(coverages.iter().flat_map(Coverage::pixels));
+    pixels.sort_unstable();
+    pixels.dedup();
+    let reference = Reference::new(pixels.iter().map(|pixel| {
+        let [r, g, b, _] = picture.pixels[*pixel as usize];
+        let place = [*pixel % picture.width, *pixel / picture.width];
+        (place, [r, g, b], picture.covered[*pixel as usize])
+    }));
+    (reference, pixels)
+}
+
+impl Drawing {
+    fn new(original: &Program, coverage: Coverage, pixels: &[u32], bindings: &Bindings) -> Self {
+        let mut places = vec![0; coverage.fragments];
+        for (place, pixel) in places.iter_mut().zip(coverage.pixels()) {
+            // Every covered pixel is among them.
+            *place = pixels.binary_search(&pixel).unwrap_or(0) as u32;
+        }
+        Self {
+            seen: coverage.late.then(|| {
+                let mut shading = Shading::default();
+                shade_into(original, &coverage, bindings, &mut shading);
+                seen(&coverage, &shading)
+            }),
+            places,
+            coverage,
+        }
+    }
+
+    /// What a display shows at each pixel of the reference.
+    fn colours(&self, shading: &Shading, pixels: usize, output: Output) -> Vec<Option<[f32; 3]>> {
+        let mut colours = vec![None; pixels];
+        each_visible(
+            &self.coverage,
+            shading,
+            pixels,
+            |fragment, _| self.places[fragment],
+            |place, fragment| {
+                colours[place as usize] = Some(encoded(output, shading.colours[fragment]));
+            },
+        );
+        colours
+    }
+}
+
+/// Some of the squares, `count` of them, spread evenly: sorted by a hash of their place and the seed.
+fn choose(all: &[(u32, u32)], count: usize, seed: u64) -> BTreeSet<(u32, u32)> {
+    let mut order: Vec<(u64, (u32, u32))> = all
+        .iter()
+        .map(|square| {
+            (
+                mix(seed ^ mix(u64::from(square.0) << 32 | u64::from(square.1))),
+                *square,
+            )
+        })
+        .collect();
+    order.sort_unstable();
+    order
+        .into_iter()
+        .take(count)
+        .map(|(_, square)| square)
+        .collect()
+}
+
+/// SplitMix64's finaliser (Steele, Lea, Flood 2014): a hash of one word.
+pub(super) fn mix(word: u64) -> u64 {
+    let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    word ^ word >> 31
+}
