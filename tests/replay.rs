@@ -7,10 +7,8 @@ mod fixtures;
 mod synthetic;
 
 use lodc::front::Source;
-use lodc_passes::operands::User;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
 use lodc_passes::{Facts, PASSES, Shader, Stage};
-use naga::TypeInner;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;
@@ -19,6 +17,8 @@ use std::{fs, thread};
 
 /// Random recipes altogether, spread evenly over the shaders.
 const RECIPES: usize = 1000;
+/// About how many pairs of candidates of one shader are made in both orders.
+const PAIRS: usize = 400;
 /// The most candidates in one recipe.
 const STEPS: usize = 8;
 
@@ -76,18 +76,6 @@ fn subjects() -> Vec<Subject> {
 fn normal_form(path: &Path) -> Shader {
     let source = Source::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     lodc::compile::normal_form(&source).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
-
-/// Whether local arrays or matrices are indexed at run time. Should an edit make such an index
-/// constant, the variable is taken apart by the normal form only, not by the edit.
-fn keeps_arrays(shader: &Shader) -> bool {
-    let functions = shader.module().entry_points.iter().map(|e| &e.function);
-    functions
-        .flat_map(|f| f.local_variables.iter())
-        .any(|(_, variable)| {
-            let inner = &shader.module().types[variable.ty].inner;
-            matches!(inner, TypeInner::Array { .. } | TypeInner::Matrix { .. })
-        })
 }
 
 /// What a shader is written as: byte for byte the same for the same shader.
@@ -186,14 +174,12 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
             .unwrap_or_else(|error| panic!("{}: {error}\n{toml}", subject.name));
         assert_eq!(replayed.fingerprint(), shader.fingerprint(), "{toml}");
         let text = wgsl(&shader);
-        if !keeps_arrays(&subject.shader) {
-            let point = |stage| shader.entry_point(stage).map(|point| point.name.as_str());
-            let fragment = point(Stage::Fragment).expect("there always is one");
-            let vertex = point(Stage::Vertex);
-            let again = lodc_passes::normalize(shader.module(), vertex, fragment, 100_000)
+        let point = |stage| shader.entry_point(stage).map(|point| point.name.as_str());
+        let fragment = point(Stage::Fragment).expect("there always is one");
+        let again =
+            lodc_passes::normalize(shader.module(), point(Stage::Vertex), fragment, 100_000)
                 .expect("edits make shaders smaller");
-            assert_eq!(again.fingerprint(), shader.fingerprint(), "{text}\n{toml}");
-        }
+        assert_eq!(again.fingerprint(), shader.fingerprint(), "{text}\n{toml}");
         assert_eq!(wgsl(&replayed), text, "{toml}");
         if let Err(error) = naga::front::wgsl::parse_str(&text) {
             panic!("{}: {}\n{toml}", subject.name, error.emit_to_string(&text));
@@ -266,62 +252,147 @@ fn any_candidate_can_be_asked_of_any_shader() {
     });
 }
 
-/// Whether an edit gives the site of another one users that it did not have: a read that has become the same as
-/// another is one value with it, and what replaces the one then replaces both.
-fn gains_users(shader: &Shader, edit: &Candidate, other: &Candidate) -> bool {
-    let users = |shader: &Shader| {
-        let (stage, site) = shader.find(&other.site)?;
-        // By name, since places change; a statement has none.
-        let name = |user: &User| match user {
-            User::Value(value) => Some(shader.id(stage, *value).clone()),
-            User::Statement(_) => None,
-        };
-        let users = shader.users(stage, site).iter().map(name);
-        Some(users.collect::<Vec<_>>())
-    };
-    let after = Recipe(vec![edit.clone()]).replay(shader);
-    let (Some(mut before), Some(after)) = (users(shader), after.ok().as_ref().and_then(users))
-    else {
-        return false;
-    };
-    after.iter().any(|user| {
-        let known = before.iter().position(|have| have == user);
-        known.map(|place| before.swap_remove(place)).is_none()
-    })
-}
-
 #[test]
 fn two_orders_of_independent_edits_are_one_variant() {
     let subjects = subjects();
     let both_ways = AtomicUsize::new(0);
-    on_two_threads(2 * RECIPES, |seed| {
-        let subject = &subjects[seed % subjects.len()];
-        let mut random = Random::new(seed);
-        let candidates = recipe::candidates(&subject.shader, &subject.facts);
-        if candidates.len() < 2 {
-            return;
-        }
-        let first = &candidates[random.below(candidates.len())];
-        let second = &candidates[random.below(candidates.len())];
-        let in_order =
-            |pair: [&Candidate; 2]| Recipe(pair.map(Clone::clone).into()).replay(&subject.shader);
-        if gains_users(&subject.shader, first, second)
-            || gains_users(&subject.shader, second, first)
-        {
-            return;
-        }
-        // Where one takes the other's site or operand away, that order is declined.
-        if let (Ok(one), Ok(other)) = (in_order([first, second]), in_order([second, first])) {
-            assert_eq!(
-                one.fingerprint(),
-                other.fingerprint(),
-                "{}: {first}; {second}",
-                subject.name
-            );
-            both_ways.fetch_add(1, Ordering::Relaxed);
+    on_two_threads(subjects.len(), |i| {
+        let Subject {
+            name,
+            shader,
+            facts,
+        } = &subjects[i];
+        let mut random = Random::new(i);
+        let candidates = recipe::candidates(shader, facts);
+        let after: Vec<Shader> = candidates
+            .iter()
+            .map(|candidate| recipe::apply(shader, candidate).expect("it was offered"))
+            .collect();
+        // All pairs are too many: some, spread over all.
+        let pairs = candidates.len() * candidates.len();
+        let stride = (pairs / PAIRS).max(1);
+        let mut pair = random.below(stride);
+        while pair < pairs {
+            let (first, second) = (pair / candidates.len(), pair % candidates.len());
+            pair += 1 + random.below(2 * stride - 1);
+            // Where one takes the other's site or operand away, that order is declined.
+            if first < second
+                && let Ok(one) = recipe::apply(&after[first], &candidates[second])
+                && let Ok(other) = recipe::apply(&after[second], &candidates[first])
+            {
+                assert_eq!(
+                    one.fingerprint(),
+                    other.fingerprint(),
+                    "{name}: {}; {}",
+                    candidates[first],
+                    candidates[second]
+                );
+                both_ways.fetch_add(1, Ordering::Relaxed);
+            }
         }
     });
-    assert!(both_ways.into_inner() > RECIPES / 2);
+    assert!(both_ways.into_inner() > 10 * PAIRS);
+}
+
+/// Pairs of edits, each with a shader, whose two orders gave two variants once.
+const ONCE_TWO_VARIANTS: [(&str, [&str; 3], [&str; 3], Orders); 7] = [
+    // The second makes a read equal to the first one's, and so one value of two.
+    (
+        "drops_shadow_comparison",
+        ["texture-removal", "near", "seen-mean = 1e30"],
+        ["op-removal", "far.mul", "keep fs_main.place.xy"],
+        Orders::One,
+    ),
+    // A part of the `if` becomes a selection, which asks for the same test.
+    (
+        "private_globals",
+        ["op-removal", "state.seed.mul", "mean = 1"],
+        ["op-removal", "maybe_next.if.less", "reject"],
+        Orders::Both,
+    ),
+    // A switch with one case is kept for a `break`, and the `break` goes.
+    (
+        "switches",
+        ["op-removal", "kind.floor", "mean = 0"],
+        ["op-removal", "pick.if.greater", "accept"],
+        Orders::Both,
+    ),
+    // The operand is a constant now, and another one has its hash.
+    (
+        "shadowed_names",
+        ["op-removal", "f.z_4.float", "mean = 2"],
+        ["op-removal", "f.z_4.mul", "keep fs_main.f.z_4.float"],
+        Orders::One,
+    ),
+    // A load becomes a value that is stored, too.
+    (
+        "out_pointers",
+        ["op-removal", "ray.length", "keep fs_main.uv.x"],
+        ["op-removal", "ray.length_2", "mean = 2"],
+        Orders::One,
+    ),
+    // The first leaves a value that nobody needs, and what the second leaves is equal to it.
+    (
+        "own_autolod",
+        ["op-removal", "shade", "keep fs_main.shade.mul"],
+        ["op-removal", "shade_2.mul_4", "mean = 0.5"],
+        Orders::Both,
+    ),
+    // A value in a loop becomes equal to one in front of it, whose own users go.
+    (
+        "pbr",
+        ["op-removal", "ambient_light.f", "mean = 1, 0, 1"],
+        [
+            "op-removal",
+            "direct_light.distribution.a2",
+            "keep fs_main.read_surface.surface.alpha",
+        ],
+        Orders::Both,
+    ),
+];
+
+/// In which orders two edits can be made.
+#[derive(Debug, PartialEq)]
+enum Orders {
+    Both,
+    One,
+}
+
+#[test]
+fn orders_of_edits_that_were_two_variants_once_are_one_or_declined() {
+    let subjects = subjects();
+    for (name, first, second, orders) in &ONCE_TWO_VARIANTS {
+        let subject = subjects.iter().find(|subject| subject.name == *name);
+        let shader = &subject.expect("the shader is there").shader;
+        let [first, second] = [first, second].map(|[pass, site, choice]| {
+            let (choice, value) = choice.split_once(" = ").unwrap_or((choice, ""));
+            let number = |number: &str| number.parse::<f32>().expect("a number").to_bits();
+            Candidate {
+                pass: (*pass).into(),
+                site: format!("fs_main.{site}").as_str().into(),
+                choice: choice.into(),
+                value: match value {
+                    "" => Vec::new(),
+                    list => list.split(", ").map(number).collect(),
+                },
+            }
+        });
+        let in_order = |edits: [&Candidate; 2]| {
+            let mut recipe = edits.into_iter();
+            recipe.try_fold(shader.clone(), |shader, edit| recipe::apply(&shader, edit))
+        };
+        let made = [in_order([&first, &second]), in_order([&second, &first])];
+        let prints: Vec<_> = made.iter().flatten().map(Shader::fingerprint).collect();
+        let found = match prints[..] {
+            [one, other] => {
+                assert_eq!(one, other, "{name}: {first}; {second}");
+                Orders::Both
+            }
+            [_] => Orders::One,
+            _ => panic!("{name}: {first}; {second}: {made:?}"),
+        };
+        assert_eq!(found, *orders, "{name}: {first}; {second}");
+    }
 }
 
 #[test]

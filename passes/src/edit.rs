@@ -7,7 +7,7 @@
 use crate::fingerprint::Declared;
 use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
-use crate::normalize::names;
+use crate::normalize::{names, split};
 use crate::operands::{self, User};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
@@ -225,6 +225,9 @@ impl<'a> Edit<'a> {
         let mut declared = Declared::of(&self.module);
         let mut rebuilt = forward::rebuild(&mut self.module, &mut declared, old, &changes);
         let mut sources: Vec<Source> = rebuilt.origins.iter().map(|o| Source::of(*o)).collect();
+        for (source, merged) in sources.iter_mut().zip(&rebuilt.merged) {
+            source.merge(*merged);
+        }
         let mut again = rebuilt.again;
         let mut rounds = 0;
         let function = loop {
@@ -232,22 +235,37 @@ impl<'a> Edit<'a> {
             let origins = kept.origins.iter();
             sources = origins.map(|old| sources[old.index()]).collect();
             again |= kept.again;
+            let mut function = kept.function;
+            // An index that is constant now may have been what kept a variable whole.
+            if let Some(split) = split::split(&self.module, &function) {
+                function = split.function;
+                let of = |old: &Option<Handle<Expression>>| {
+                    old.map_or(Source::Made, |old| sources[old.index()])
+                };
+                sources = split.origins.iter().map(of).collect();
+                again = true;
+            }
             rounds += 1;
             if !again || rounds == ROUNDS {
-                break kept.function;
+                break function;
             }
             rebuilt = forward::rebuild(
                 &mut self.module,
                 &mut declared,
-                &kept.function,
-                &Changes::none(&kept.function),
+                &function,
+                &Changes::none(&function),
             );
             sources = rebuilt
                 .origins
                 .iter()
-                .map(|origin| match origin {
-                    Origin::Value(old) => sources[old.index()],
-                    other => Source::of(*other),
+                .zip(&rebuilt.merged)
+                .map(|(origin, merged)| {
+                    let mut source = match origin {
+                        Origin::Value(old) => sources[old.index()],
+                        other => Source::of(*other),
+                    };
+                    source.merge(*merged);
+                    source
                 })
                 .collect();
             again = rebuilt.again;
@@ -258,7 +276,7 @@ impl<'a> Edit<'a> {
         Shader::new(self.module, ids)
     }
 
-    /// The ids of the new values. Old values keep theirs; a second copy of one, and what was made on the
+    /// The ids of the new values. Old values keep theirs. What several values have become, a second copy of one, and what was made on the
     /// way, gets an ordinal behind a `~`, which no path of the normal form has.
     fn ids(&self, function: &Function, sources: &[Source]) -> Vec<ValueId> {
         let base = &self.shader.ids[self.entry];
@@ -286,6 +304,10 @@ impl<'a> Edit<'a> {
                     return ValueId::new(names::literal_path(entry, *literal), 0);
                 }
                 match *source {
+                    Source::Merged(at) => fresh(match base.get(at) {
+                        Some(id) => id.path(),
+                        None => &self.added[at - base.len()],
+                    }),
                     Source::Value(at) => {
                         let first = !std::mem::replace(&mut seen[at], true);
                         match base.get(at) {
@@ -309,10 +331,15 @@ impl<'a> Edit<'a> {
     }
 }
 
-/// Where a new value comes from: an old or added value, by its index, or nowhere.
+/// Where a new value comes from.
 #[derive(Clone, Copy)]
 enum Source {
+    /// An old or added value, by its index.
     Value(usize),
+    /// Several, of which this is one. What an edit would do to one of them, it would do to all now: so none
+    /// of their ids may name it, or the order of two edits would matter.
+    Merged(usize),
+    /// Nowhere.
     Made,
 }
 
@@ -321,6 +348,12 @@ impl Source {
         match origin {
             Origin::Value(old) => Self::Value(old.index()),
             Origin::Local(_) | Origin::Made => Self::Made,
+        }
+    }
+
+    fn merge(&mut self, merged: bool) {
+        if let (Self::Value(at), true) = (*self, merged) {
+            *self = Self::Merged(at);
         }
     }
 }

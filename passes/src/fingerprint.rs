@@ -4,8 +4,8 @@
 use crate::operands;
 use crate::shader::Fingerprint;
 use naga::{
-    Block, Expression, Function, GlobalVariable, Handle, ImageQuery, LocalVariable, Module,
-    Override, SampleLevel, Statement, Type, TypeInner,
+    AddressSpace, Block, Expression, Function, GlobalVariable, Handle, ImageQuery, LocalVariable,
+    Module, Override, SampleLevel, Statement, StorageAccess, Type, TypeInner,
 };
 use std::hash::{Hash, Hasher};
 use std::mem::discriminant;
@@ -90,6 +90,8 @@ pub(crate) struct Declared {
     constants: Vec<u64>,
     overrides: Vec<u64>,
     globals: Vec<u64>,
+    /// For each global variable, whether what it holds never changes while the shader runs.
+    constant_memory: Vec<bool>,
 }
 
 impl Declared {
@@ -99,6 +101,7 @@ impl Declared {
             constants: Vec::new(),
             overrides: Vec::new(),
             globals: Vec::new(),
+            constant_memory: Vec::new(),
         };
         for (_, ty) in module.types.iter() {
             let hash = declared.of_type(module, ty);
@@ -144,6 +147,11 @@ impl Declared {
             words.word(declared.ty(*ty));
             words.word(init.map_or(0, |init| constants[init.index()]));
             declared.globals.push(words.finish());
+            declared.constant_memory.push(match space {
+                AddressSpace::Uniform | AddressSpace::Immediate => true,
+                AddressSpace::Storage { access } => !access.contains(StorageAccess::STORE),
+                _ => false,
+            });
         }
         declared
     }
@@ -330,9 +338,10 @@ fn take_in(declared: &Declared, function: &Function, words: &mut Words) {
     walk.block(&function.body);
 }
 
-/// A walk over a body. A value is known by what it is made of and by the block that computes it, so
-/// that the order of values in a block does not matter; what is loaded from memory that may change is
-/// known by the number of statements before it, too.
+/// A walk over a body. A value is known by what it is made of, wherever it is computed: an edit may leave it
+/// further out than another order of the same edits does. What depends on its place is known by that too:
+/// derivatives and samples by their block, what is loaded from memory that may change by the number of
+/// statements before it.
 struct Canonical<'a> {
     declared: &'a Declared,
     function: &'a Function,
@@ -407,12 +416,14 @@ impl Canonical<'_> {
     fn computed(&mut self, value: Handle<Expression>, block: u64) {
         let mut words = Words::new();
         words.word(self.content(value));
-        words.word(block);
-        if matches!(
-            self.function.expressions[value],
-            Expression::Load { .. } | Expression::ImageLoad { .. }
-        ) {
-            words.word(self.statements);
+        match self.function.expressions[value] {
+            Expression::Load { pointer } if self.is_constant_memory(pointer) => {}
+            Expression::Load { .. } | Expression::ImageLoad { .. } => {
+                words.word(block);
+                words.word(self.statements);
+            }
+            Expression::ImageSample { .. } | Expression::Derivative { .. } => words.word(block),
+            _ => {}
         }
         self.keys[value.index()] = words.finish() | 1;
     }
@@ -463,6 +474,21 @@ impl Canonical<'_> {
             if let Some(result) = operands::result(statement) {
                 self.words.word(self.statements);
                 self.keys[result.index()] = self.statements;
+            }
+        }
+    }
+
+    /// Whether a pointer leads into a buffer that never changes while the shader runs.
+    fn is_constant_memory(&self, mut pointer: Handle<Expression>) -> bool {
+        loop {
+            match self.function.expressions[pointer] {
+                Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
+                    pointer = base;
+                }
+                Expression::GlobalVariable(global) => {
+                    return self.declared.constant_memory[global.index()];
+                }
+                _ => return false,
             }
         }
     }

@@ -40,6 +40,24 @@ impl Candidate {
         self.value.iter().map(|bits| f32::from_bits(*bits))
     }
 
+    /// The same candidate with its values named as in another version of their shader.
+    fn known_to(&self, base: &Shader) -> Self {
+        let word = |word: &str| match base.known_as(&word.into()) {
+            Some(id) if word.contains('#') => id.to_string(),
+            _ => word.to_owned(),
+        };
+        Self {
+            site: base.known_as(&self.site).unwrap_or(&self.site).clone(),
+            choice: self
+                .choice
+                .split(' ')
+                .map(word)
+                .collect::<Vec<_>>()
+                .join(" "),
+            ..self.clone()
+        }
+    }
+
     /// The numbers that it bakes, when they are `count` finite ones.
     ///
     /// # Errors
@@ -139,19 +157,14 @@ pub struct ReplayError {
 }
 
 impl Recipe {
-    /// Applies every candidate in order. A site that was renamed in the base since is found by its hash.
+    /// Applies every candidate in order. A value that was renamed in the base since is found by its hash.
     ///
     /// # Errors
     /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
     pub fn replay(&self, base: &Shader) -> Result<Shader, Box<ReplayError>> {
         let mut shader = base.clone();
         for (step, candidate) in self.0.iter().enumerate() {
-            let site = base.known_as(&candidate.site).unwrap_or(&candidate.site);
-            let here = Candidate {
-                site: site.clone(),
-                ..candidate.clone()
-            };
-            shader = apply(&shader, &here).map_err(|declined| {
+            shader = apply(&shader, &candidate.known_to(base)).map_err(|declined| {
                 Box::new(ReplayError {
                     step,
                     candidate: candidate.clone(),

@@ -34,6 +34,8 @@ pub(crate) struct Rebuilt {
     pub(crate) function: Function,
     /// For each expression.
     pub(crate) origins: Vec<Origin>,
+    /// For each expression, whether values that were several have become it; its origin is one of them.
+    pub(crate) merged: Vec<bool>,
     /// For each store of a value to a local variable: the new value, and the variable that it became
     /// known under. A variable keeps its handle.
     pub(crate) stored: Vec<(Handle<Expression>, Handle<LocalVariable>)>,
@@ -123,6 +125,9 @@ struct Forward<'a> {
 
     new: Arena<Expression>,
     origins: Vec<Origin>,
+    merged: Vec<bool>,
+    /// For each old expression, whether a statement needs it, as far as can be told beforehand.
+    needed: Vec<bool>,
     /// For each new expression, the block that computed it: its depth and number, or none.
     blocks: Vec<Option<(usize, u32)>>,
     /// For each new expression, its place in the table of constants if it is one.
@@ -206,6 +211,8 @@ pub(crate) fn rebuild(
         declared,
         new: Arena::new(),
         origins: Vec::with_capacity(count),
+        merged: Vec::with_capacity(count),
+        needed: vec![false; count],
         blocks: Vec::with_capacity(count),
         constant_of: Vec::with_capacity(count),
         types: Vec::new(),
@@ -227,6 +234,7 @@ pub(crate) fn rebuild(
         stored: Vec::new(),
         again: false,
     };
+    forward.need(body);
     forward.start();
     forward.statements(body);
     forward.flush();
@@ -251,6 +259,7 @@ pub(crate) fn rebuild(
             diagnostic_filter_leaf: old.diagnostic_filter_leaf,
         },
         origins: forward.origins,
+        merged: forward.merged,
         stored: forward.stored,
         again: forward.again,
     }
@@ -354,6 +363,7 @@ impl Forward<'_> {
         let span = self.span(origin);
         let new = self.new.append(expression, span);
         self.origins.push(origin);
+        self.merged.push(false);
         self.constant_of.push(None);
         self.types.push(None);
         let place = (self.open.len() - 1, self.open[self.open.len() - 1]);
@@ -393,6 +403,7 @@ impl Forward<'_> {
         if let Some(&equal) = self.equal.get(&key)
             && same(&self.new[equal], &expression)
         {
+            self.merged[equal.index()] |= self.origins[equal.index()] != origin;
             // The first one takes the name that a person gave the second.
             if let (Origin::Value(first), Origin::Value(second)) =
                 (self.origins[equal.index()], origin)
@@ -653,6 +664,21 @@ impl Forward<'_> {
     }
 
     // ---- Old values ----
+
+    /// Finds out what is needed. What a replacement has left without users is not computed, or equal values
+    /// further in would be taken for it.
+    fn need(&mut self, body: &Block) {
+        let mut open = Vec::new();
+        operands::walk(body, &mut |statement| {
+            operands::each_of_statement(statement, |operand| open.push(operand));
+        });
+        while let Some(value) = open.pop() {
+            let value = self.replacement(value);
+            if !std::mem::replace(&mut self.needed[value.index()], true) {
+                operands::each(&self.expressions[value], |operand| open.push(operand));
+            }
+        }
+    }
 
     fn replacement(&self, mut old: Handle<Expression>) -> Handle<Expression> {
         let mut steps = 0;
@@ -1206,9 +1232,18 @@ impl Forward<'_> {
                 let mut value = self.read(local);
                 if steps.is_empty()
                     && let Value::Computed(new) = value
-                    && matches!(self.origins[new.index()], Origin::Local(_))
                 {
-                    self.origins[new.index()] = origin;
+                    let loaded = matches!(self.new[new], Expression::Load { .. });
+                    let before = self.origins[new.index()];
+                    let first = matches!(before, Origin::Local(_));
+                    // Of a value that was stored, or loaded elsewhere too, this load is one user of several.
+                    self.merged[new.index()] |= match loaded {
+                        true => !first && before != origin,
+                        false => first,
+                    };
+                    if first {
+                        self.origins[new.index()] = origin;
+                    }
                 }
                 for (at, step) in steps.iter().enumerate() {
                     let last = at + 1 == steps.len();
@@ -1485,7 +1520,7 @@ impl Forward<'_> {
         match statement {
             Statement::Emit(range) => {
                 for old in range.clone() {
-                    if self.map[old.index()].is_none() {
+                    if self.needed[old.index()] && self.map[old.index()].is_none() {
                         self.make(old);
                     }
                 }
@@ -1832,6 +1867,10 @@ impl Forward<'_> {
                 body,
                 fall_through: case.fall_through,
             });
+        }
+        if let ([only], true) = (&built[..], self.constant_of[selector.index()].is_some()) {
+            // It was kept for a `break` that may be gone.
+            self.again |= !breaks(&only.body);
         }
         let target = self.targets.pop();
         self.push(

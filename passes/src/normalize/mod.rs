@@ -11,7 +11,7 @@ pub(crate) mod forward;
 mod inline;
 pub(crate) mod names;
 mod returns;
-mod split;
+pub(crate) mod split;
 
 use crate::fingerprint::{self, Declared};
 use crate::{Shader, live};

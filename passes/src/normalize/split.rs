@@ -11,12 +11,12 @@ use naga::{
 const MOST: usize = 64;
 
 /// A split function.
-pub(super) struct Split {
-    pub(super) function: Function,
+pub(crate) struct Split {
+    pub(crate) function: Function,
     /// For each expression the old one; nothing for those that take a whole apart or put it together.
-    pub(super) origins: Vec<Option<Handle<Expression>>>,
+    pub(crate) origins: Vec<Option<Handle<Expression>>>,
     /// For each local variable the old one, and the members that lead to it, such as `.normal`.
-    pub(super) locals: Vec<(Handle<LocalVariable>, String)>,
+    pub(crate) locals: Vec<(Handle<LocalVariable>, String)>,
 }
 
 /// A variable or a part of one.
@@ -35,7 +35,17 @@ struct Node {
 }
 
 /// Splits the local variables of a function; nothing when there is nothing to split.
-pub(super) fn split(module: &Module, old: &Function) -> Option<Split> {
+pub(crate) fn split(module: &Module, old: &Function) -> Option<Split> {
+    let mut variables = old.local_variables.iter();
+    let is_aggregate = |ty: Handle<Type>| {
+        matches!(
+            module.types[ty].inner,
+            TypeInner::Struct { .. } | TypeInner::Array { .. }
+        )
+    };
+    if !variables.any(|(_, variable)| is_aggregate(variable.ty)) {
+        return None;
+    }
     let mut tree = Tree {
         module,
         nodes: Vec::new(),

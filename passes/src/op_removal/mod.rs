@@ -10,7 +10,8 @@
 //! keeps its other operand, as if the site were the zero of a sum, the one of a product, or the side of
 //! a mix that is not chosen; so a costly value that several operations share dies at once, where each
 //! removal alone would save nothing. `accept` and `reject`, at the condition of an `if`: that side is
-//! taken always, and the test and the other side go.
+//! taken always, and the test and the other side go; what else asks for the test gets the same answer, since
+//! normal form may have made a selection of a part of the `if`.
 //!
 //! Error. Not known here: it is measured. A mean is the constant with the least squared error in the
 //! value itself, which is why the constant operand of an operation is not offered.
@@ -41,7 +42,7 @@ mod survey;
 
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
-use crate::operands::{self, User};
+use crate::operands;
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, constants};
@@ -64,7 +65,7 @@ enum Choice {
     Mean,
     /// The users do without it.
     Without,
-    /// Every `if` on the site, a truth value, takes this side.
+    /// The site, a truth value, makes every `if` on it take this side.
     Take(bool),
 }
 
@@ -112,16 +113,17 @@ impl Pass for OpRemoval {
         match plan(shader, candidate) {
             Ok((stage, changes)) => {
                 let mut edit = Edit::new(shader, stage);
-                for change in changes {
-                    match change {
-                        Change::Value(value, new) => edit.replace(value, new),
-                        Change::Condition(statement, condition, side) => {
+                for (value, new) in changes {
+                    let new = match new {
+                        Becomes::Value(kept) => New::Value(kept),
+                        Becomes::Numbers(numbers) => New::Numbers(numbers),
+                        Becomes::Side(side) => {
                             let path = format!("{}.{}", candidate.site.path(), candidate.choice);
                             let side = Expression::Literal(Literal::Bool(side));
-                            let side = New::Value(edit.add(path, side));
-                            edit.replace_operand(User::Statement(statement), condition, side);
+                            New::Value(edit.add(path, side))
                         }
-                    }
+                    };
+                    edit.replace(value, new);
                 }
                 edit.finish()
             }
@@ -130,17 +132,20 @@ impl Pass for OpRemoval {
     }
 }
 
-/// A part of what a candidate does.
+/// What takes the place of a value.
 #[derive(Debug)]
-enum Change {
-    /// All users of a value use another.
-    Value(Value, New),
-    /// The `if` statement of this number takes one side.
-    Condition(usize, Value, bool),
+enum Becomes {
+    Value(Value),
+    Numbers(Vec<f32>),
+    /// The truth value that has an `if` take a side.
+    Side(bool),
 }
 
 /// What a candidate replaces by what.
-fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<Change>), Declined> {
+fn plan(
+    shader: &Shader,
+    candidate: &Candidate,
+) -> Result<(Stage, Vec<(Value, Becomes)>), Declined> {
     let choice = Choice::parse(&candidate.choice)?;
     let (stage, site) = shader
         .find(&candidate.site)
@@ -165,7 +170,7 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<Change>), 
                     "a constant is not kept: the mean is a better one".into(),
                 ));
             }
-            vec![Change::Value(site, New::Value(kept))]
+            vec![(site, Becomes::Value(kept))]
         }
         Choice::Mean => {
             let count = mean_components(&flow, site).ok_or_else(|| {
@@ -177,17 +182,17 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Stage, Vec<Change>), 
             follow(&flow, &sites, &numbers)?;
             sites
                 .into_iter()
-                .map(|site| Change::Value(site, New::Numbers(numbers.clone())))
+                .map(|site| (site, Becomes::Numbers(numbers.clone())))
                 .collect()
         }
         Choice::Without => without(&flow, site)?
             .into_iter()
-            .map(|(user, kept)| Change::Value(user, New::Value(kept)))
+            .map(|(user, kept)| (user, Becomes::Value(kept)))
             .collect(),
-        Choice::Take(side) => take(&flow, site, &ifs(&flow), side)?
-            .iter()
-            .map(|branch| Change::Condition(branch.statement, site, side))
-            .collect(),
+        Choice::Take(side) => {
+            take(&flow, site, &ifs(&flow), side)?;
+            vec![(site, Becomes::Side(side))]
+        }
     };
     Ok((stage, changes))
 }
@@ -221,17 +226,10 @@ fn own_operands(flow: &Flow, site: Value) -> Vec<Value> {
     own
 }
 
-/// The value among a few that an id means: the one of its path, or the only one of its hash.
+/// The value among a few that has this path.
 fn named(flow: &Flow, values: &[Value], id: &ValueId) -> Option<Value> {
     let mut values = values.iter().copied();
-    let by_path = values
-        .clone()
-        .find(|value| flow.id(*value).path() == id.path());
-    by_path.or_else(|| {
-        let has_hash = |value: &Value| id.hash() != 0 && flow.id(*value).hash() == id.hash();
-        let found = values.find(has_hash)?;
-        values.all(|value| !has_hash(&value)).then_some(found)
-    })
+    values.find(|value| flow.id(*value).path() == id.path())
 }
 
 /// How many components the mean of a value would have; `None` when it can have none.
@@ -364,8 +362,6 @@ fn other_operand(flow: &Flow, user: Value, gone: Value) -> Option<Value> {
 /// An `if` statement.
 #[derive(Clone, Copy)]
 struct If<'a> {
-    /// Its number in the order of [`operands::walk`].
-    statement: usize,
     condition: Value,
     accept: &'a Block,
     reject: &'a Block,
@@ -380,7 +376,6 @@ impl<'a> If<'a> {
 /// The `if` statements of a function, in order.
 fn ifs<'a>(flow: &Flow<'a>) -> Vec<If<'a>> {
     let mut found = Vec::new();
-    let mut number = 0;
     operands::walk(&flow.function.body, &mut |statement| {
         if let Statement::If {
             condition,
@@ -389,13 +384,11 @@ fn ifs<'a>(flow: &Flow<'a>) -> Vec<If<'a>> {
         } = statement
         {
             found.push(If {
-                statement: number,
                 condition: *condition,
                 accept,
                 reject,
             });
         }
-        number += 1;
     });
     found
 }
