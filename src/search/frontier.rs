@@ -1,4 +1,5 @@
-//! The Pareto frontier of error against cost over every variant that was seen.
+//! The Pareto frontier of error against cost over every variant that was seen. The error is the share of its bound
+//! that a variant uses up, where it uses up most.
 
 use lodc_passes::{Recipe, Work};
 
@@ -25,14 +26,14 @@ impl Frontier {
     /// Adds a variant, unless a member is at least as good in both, and drops those that it beats.
     pub fn add(&mut self, seen: Seen) {
         let cost = seen.work.total();
-        if !(seen.square.is_finite() && cost.is_finite()) {
+        if !(seen.strain.is_finite() && cost.is_finite()) {
             return;
         }
         // Members are sorted by cost up, and so by error down.
         let at = self
             .members
             .partition_point(|member| member.work.total() <= cost);
-        if at > 0 && self.members[at - 1].square <= seen.square {
+        if at > 0 && self.members[at - 1].strain <= seen.strain {
             return;
         }
         let same_cost = self.members[..at]
@@ -41,7 +42,7 @@ impl Frontier {
             .map_or(0, |last| last + 1);
         let beaten = self.members[at..]
             .iter()
-            .take_while(|member| member.square >= seen.square)
+            .take_while(|member| member.strain >= seen.strain)
             .count();
         self.members.splice(same_cost..at + beaten, [seen]);
     }
@@ -56,11 +57,11 @@ impl Frontier {
 mod tests {
     use super::*;
 
-    fn seen(cost: f64, square: f64) -> Seen {
+    fn seen(cost: f64, strain: f64) -> Seen {
         Seen {
             recipe: Recipe::default(),
-            square,
-            strain: 0.0,
+            square: strain,
+            strain,
             work: Work {
                 simple: cost,
                 ..Work::default()
@@ -89,7 +90,7 @@ mod tests {
         let found: Vec<_> = frontier
             .members()
             .iter()
-            .map(|m| (m.work.total(), m.square))
+            .map(|m| (m.work.total(), m.strain))
             .collect();
         assert_eq!(found, [(1.0, 9.0), (3.0, 4.0), (9.0, 0.5), (10.0, 0.0)]);
     }

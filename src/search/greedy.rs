@@ -1,6 +1,7 @@
-//! Greedy simplification at one distance: Olano's loop.
+//! Greedy simplification for one interval of distances: Olano's loop.
 //!
-//! The price of a candidate is the squared error that it adds for each unit of work that it saves.
+//! The price of a candidate is the squared error that it adds, in units of the squared bound, for each unit of work
+//! that it saves.
 //! Every candidate is priced once; the cheapest is taken; then only the candidates at the front of the queue
 //! are priced again, until one that is up to date leads it. That is Olano's "re-compute costs for
 //! area local to site" without having to know how far an edit reaches.
@@ -9,6 +10,7 @@
 //! section 2; the lazy queue is that of Minoux, "Accelerated greedy algorithms", 1978.
 
 use super::frontier::{Frontier, Seen};
+use super::interval::Interval;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
 use lodc_passes::{Candidate, Fingerprint, PASSES, Recipe, Shader, recipe};
@@ -32,11 +34,11 @@ pub(crate) struct Variant {
 impl Variant {
     /// Measures a shader that a recipe made.
     pub(crate) fn new(
-        set: &SampleSet<'_>,
+        interval: &Interval<'_>,
         recipe: Recipe,
         shader: Shader,
     ) -> Result<Self, Refused> {
-        let measured = set.measure(&shader)?;
+        let measured = interval.measure(&shader)?;
         Ok(Self {
             recipe,
             shader,
@@ -62,7 +64,7 @@ struct Price(f64, f64);
 impl Price {
     fn of(before: &Measured, after: &Measured) -> Option<Self> {
         let saved = before.work.total() - after.work.total();
-        let added = after.error.square() - before.error.square();
+        let added = after.load - before.load;
         if saved <= 0.0 || saved.is_nan() || added.is_nan() {
             return None;
         }
@@ -92,8 +94,8 @@ pub(crate) struct Prices(BTreeMap<Key, Option<Price>>);
 
 /// What one greedy descent is told.
 pub(crate) struct Descent<'a> {
-    /// The samples that it is judged on, within their bound.
-    pub(crate) set: &'a SampleSet<'a>,
+    /// The samples that it is judged on, within their bounds.
+    pub(crate) interval: &'a Interval<'a>,
     /// Told how many variants have been measured, and the cost of the current one as a share of the
     /// original's.
     pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
@@ -121,7 +123,7 @@ impl Descent<'_> {
         let mut swept = false;
         frontier.add(current.seen());
         loop {
-            let facts = self.set.facts(&current.shader);
+            let facts = self.interval.start().facts(&current.shader);
             let candidates: Vec<Candidate> = PASSES
                 .iter()
                 .flat_map(|pass| pass.candidates(&current.shader, &facts))
@@ -169,7 +171,8 @@ impl Descent<'_> {
         for round in 0.. {
             step.measure(self, &batch, prices, over, frontier);
             *measured += batch.len() as u64;
-            let share = step.current.measured.work.total() / self.set.original().work.total();
+            let share =
+                step.current.measured.work.total() / self.interval.start().original().work.total();
             (self.progress)(*measured, share);
             let mut queue: Vec<(Price, usize)> = all
                 .clone()
@@ -214,7 +217,7 @@ impl Step<'_> {
                 let fingerprint = shader.fingerprint();
                 let measured = match self.tried.get(&fingerprint) {
                     Some(measured) => *measured,
-                    None => descent.set.measure(&shader).ok()?,
+                    None => descent.interval.measure(&shader).ok()?,
                 };
                 Some((fingerprint, measured))
             })

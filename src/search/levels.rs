@@ -8,6 +8,7 @@
 use super::error::ErrorFigures;
 use super::frontier::{Frontier, Seen};
 use super::greedy::{Descent, Prices, Variant};
+use super::interval::Interval;
 use super::samples::{Measured, SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use crate::scene::Scene;
@@ -35,6 +36,28 @@ pub struct Level {
     pub cost: f64,
     /// For each step of the recipe, the RMSE after it, over the full set.
     pub error_after: Vec<f64>,
+}
+
+impl Level {
+    /// The original, from a distance on.
+    fn original(stand: &Stand<'_>, set: &SampleSet<'_>) -> Self {
+        Self {
+            autolod: threshold(stand.scene, set.distance()),
+            distance: set.distance(),
+            recipe: Recipe::default(),
+            shader: stand.base.clone(),
+            error: set.floor(),
+            work: set.original().work,
+            cost: 1.0,
+            error_after: Vec::new(),
+        }
+    }
+
+    /// Whether it is within the bound at every one of these distances.
+    fn holds(&self, checks: &[SampleSet<'_>]) -> bool {
+        let holds = |set: &SampleSet<'_>| set.measure(&self.shader).is_ok_and(|m| m.strain <= 1.0);
+        self.recipe.0.is_empty() || checks.iter().all(holds)
+    }
 }
 
 /// What was seen at one distance.
@@ -89,25 +112,20 @@ pub fn find(
 ) -> std::result::Result<Found, Refused> {
     let scene = stand.scene;
     let distances = &scene.distances;
-    let original = |distance: f64, set: &SampleSet<'_>| Level {
-        autolod: scene.auto_lod(distance),
-        distance,
-        recipe: Recipe::default(),
-        shader: stand.base.clone(),
-        error: set.floor(),
-        work: set.original().work,
-        cost: 1.0,
-        error_after: Vec::new(),
-    };
     let nearest = SampleSet::new(stand, distances[0], Samples::Full)?;
-    let mut levels = vec![original(distances[0], &nearest)];
+    let mut levels = vec![Level::original(stand, &nearest)];
+    drop(nearest);
     let mut seen = Vec::new();
     let mut prices = Prices::default();
     let mut variants = 0;
+    // The samples at the end of one interval are those at the start of the next.
+    let mut end = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
-        let search = SampleSet::new(stand, distance, Samples::Search)?;
+        let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
+        let middle = (distance * next).sqrt();
+        let search = Interval::new(stand, &[distance, next], Samples::Search)?;
         let descent = Descent {
-            set: &search,
+            interval: &search,
             progress: &|measured, share| {
                 progress(Progress {
                     distance: at,
@@ -126,33 +144,38 @@ pub fn find(
         let mut frontier = Frontier::default();
         frontier.add(base.seen());
         variants += descent.run(start, &mut prices, &mut frontier);
-        let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
-        let interval = [distance, (distance * next).sqrt(), next];
-        let checks = |samples| {
-            let check = |distance| SampleSet::new(stand, distance, samples);
-            interval
-                .into_iter()
-                .map(check)
-                .collect::<std::result::Result<Vec<_>, _>>()
-        };
-        let quick = checks(Samples::Search)?;
         let feasible: Vec<&Seen> = frontier
             .members()
             .iter()
-            .filter(|member| member.strain <= 1.0 && passes_all(stand, member, &quick))
+            .filter(|member| member.strain <= 1.0)
             .collect();
-        let checks = checks(Samples::Full)?;
-        if let Some(level) = cheapest_confirmed(stand, &feasible, &checks) {
-            let before = &levels[levels.len() - 1];
-            if level.cost < (1.0 - MERGE_BELOW) * before.cost {
-                levels.push(level);
-            }
-        }
+        let begin = match end.take() {
+            Some(set) => set,
+            None => SampleSet::new(stand, distance, Samples::Full)?,
+        };
+        let checks = [
+            begin,
+            SampleSet::new(stand, middle, Samples::Full)?,
+            SampleSet::new(stand, next, Samples::Full)?,
+        ];
+        let before = &levels[levels.len() - 1];
+        let found = cheapest_confirmed(stand, &feasible, &checks);
+        let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * before.cost;
+        // Without a level here the one before is used on, where it has not been looked at yet.
+        let next_level = match found {
+            Some(level) if worth(&level) => Some(level),
+            _ if before.holds(&checks) => None,
+            other => Some(other.unwrap_or_else(|| Level::original(stand, &checks[0]))),
+        };
+        levels.extend(next_level);
+        let [_, _, last] = checks;
+        end = Some(last);
+        let original = search.start().original();
         seen.push(AtDistance {
             distance,
             autolod: scene.auto_lod(distance),
-            original: search.original().work,
-            floor_square: search.original().error.square(),
+            original: original.work,
+            floor_square: original.error.square(),
             frontier: frontier.members().to_vec(),
         });
     }
@@ -168,14 +191,6 @@ pub fn find(
 /// begins nearer than where it was confirmed.
 fn threshold(scene: &Scene, distance: f64) -> f64 {
     (scene.auto_lod(distance) * 100.0).ceil() / 100.0
-}
-
-/// Whether a member is within the bound at every distance.
-fn passes_all(stand: &Stand<'_>, member: &Seen, checks: &[SampleSet<'_>]) -> bool {
-    member.recipe.replay(stand.base).is_ok_and(|shader| {
-        let passes = |set: &SampleSet<'_>| set.measure(&shader).is_ok_and(|m| m.strain <= 1.0);
-        checks.iter().all(passes)
-    })
 }
 
 /// The cheapest member that every check passes. Error falls as cost rises along a frontier, so the place is

@@ -14,6 +14,7 @@ mod facts;
 mod frame;
 pub mod frontier;
 mod greedy;
+mod interval;
 pub mod levels;
 pub mod samples;
 

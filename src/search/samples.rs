@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// Squares of 2 x 2 pixels that a search set has, over all of its frames; a frame has at least one block full.
 const SEARCH_SQUARES: usize = 1024;
 
+/// The least bound that errors are weighed by, so that a bound of 0 weighs them too.
+const LEAST_BOUND: f64 = 1e-6;
+
 /// What a search stands on.
 pub struct Stand<'a> {
     /// The original in normal form.
@@ -33,12 +36,14 @@ pub enum Samples {
 }
 
 /// What was measured of a variant.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
     /// Its error against the reference.
     pub error: ErrorSum,
     /// How much of its bound it uses up at this distance; feasible when at most 1 (see [`ErrorFigures::strain`]).
     pub strain: f64,
+    /// `E^2` less the original's, in units of the square of the bound: what a search weighs against work.
+    pub load: f64,
     /// Executed work of a covered fragment.
     pub work: Work,
 }
@@ -131,9 +136,12 @@ impl<'a> SampleSet<'a> {
     }
 
     fn judge(&self, (details, work): &(Details, Work)) -> Measured {
+        let figures = self.figures_of(details);
+        let added = details.error.square() - self.original.0.error.square();
         Measured {
             error: details.error,
-            strain: self.figures_of(details).strain(),
+            strain: figures.strain(),
+            load: added / figures.bound.max(LEAST_BOUND).powi(2),
             work: *work,
         }
     }

@@ -121,3 +121,172 @@ impl ErrorFigures {
             .max(share(self.shimmer - self.shimmer_floor, SHIMMER_FACTOR))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::error::{Reference, Tally};
+
+    /// What a picture of 4 x 4 pixels shows; `None` is background.
+    type Colours = [Option<[f32; 3]>; 16];
+
+    /// A reference of 4 x 4 pixels: linear grey (premultiplied) and coverage of each.
+    fn reference(pixel: impl Fn(usize) -> (f32, f32)) -> Reference {
+        Reference::new((0..16).map(|i| {
+            let (grey, coverage) = pixel(i);
+            ([i as u32 % 4, i as u32 / 4], [grey; 3], coverage)
+        }))
+    }
+
+    fn details(reference: &Reference, drawings: &[Colours]) -> Details {
+        Details::new([(0, frame(reference, drawings))])
+    }
+
+    fn frame(reference: &Reference, drawings: &[Colours]) -> FrameError {
+        let mut tally = Tally::new(reference);
+        for drawing in drawings {
+            tally.add(drawing);
+        }
+        tally.finish()
+    }
+
+    fn close(found: f64, by_hand: f64) {
+        assert!((found - by_hand).abs() < 1e-6, "{found}, not {by_hand}");
+    }
+
+    const WHITE: Option<[f32; 3]> = Some([1.0; 3]);
+    const BLACK: Option<[f32; 3]> = Some([0.0; 3]);
+
+    #[test]
+    fn error_maximum_and_psnr() {
+        // A white square; four pixels are off by 0.5, 0.25 and 0 in the three channels.
+        let white = reference(|_| (1.0, 1.0));
+        let level: Colours = std::array::from_fn(|i| match i {
+            0..4 => Some([0.5, 0.75, 1.0]),
+            _ => WHITE,
+        });
+        let level = details(&white, &[level]);
+        // 4 of 16 pixels, (0.25 + 0.0625 + 0) / 3 each.
+        close(level.error.square(), 4.0 / 16.0 * 0.3125 / 3.0);
+        let figures = ErrorFigures::new(&level, &details(&white, &[[WHITE; 16]]), 0.1);
+        close(figures.rmse, 0.161_374_3);
+        close(figures.max, 0.5);
+        // -10 log10(0.02604167)
+        close(figures.psnr(), 15.843_312);
+        assert_eq!((figures.floor, figures.shimmer), (0.0, 0.0));
+    }
+
+    #[test]
+    fn coverage_counts_over_black_and_over_white() {
+        // A black object that covers the left half; the level has lost one column of it.
+        let half = reference(|i| (0.0, if i % 4 < 2 { 1.0 } else { 0.0 }));
+        let level: Colours = std::array::from_fn(|i| if i % 4 == 0 { BLACK } else { None });
+        let level = details(&half, &[level]);
+        // Lost: 0 over black, 1 over white, the mean 1/2, in 4 pixels; divided by the reference's 8, not the level's 4.
+        close(level.error.square(), 4.0 * 0.5 / 8.0);
+        // One column too many: no reference there, so black over white is wrong wholly; the union is 12 pixels.
+        let more: Colours = std::array::from_fn(|i| if i % 4 < 3 { BLACK } else { None });
+        close(details(&half, &[more]).error.square(), 4.0 * 0.5 / 8.0);
+        let exact: Colours = std::array::from_fn(|i| if i % 4 < 2 { BLACK } else { None });
+        assert_eq!(details(&half, &[exact]).error.square(), 0.0);
+    }
+
+    #[test]
+    fn a_half_covered_pixel_is_compared_premultiplied() {
+        // Every pixel half covered by white: linear 0.5 over black, 1 over white. Drawn whole, it is off by
+        // 1 - 0.735357 over black alone; not drawn, by 0.735357 over black alone.
+        let half = reference(|_| (0.5, 0.5));
+        let encoded = 0.735_356_9_f64;
+        let whole = details(&half, &[[WHITE; 16]]);
+        close(whole.error.square(), (1.0 - encoded).powi(2) / 2.0 / 0.5);
+        let none = details(&half, &[[None; 16]]);
+        close(none.error.square(), encoded.powi(2) / 2.0 / 0.5);
+    }
+
+    #[test]
+    fn excess_is_what_the_level_adds_to_the_floor() {
+        let white = reference(|_| (1.0, 1.0));
+        let off = |by: f32| details(&white, &[[Some([1.0 - by; 3]); 16]]);
+        // 0.5^2 - 0.3^2 = 0.4^2
+        let figures = ErrorFigures::new(&off(0.5), &off(0.3), 0.8);
+        close(figures.rmse, 0.5);
+        close(figures.floor, 0.3);
+        close(figures.excess(), 0.4);
+        close(figures.strain(), 0.5);
+        // Better than the original is no excess.
+        let better = ErrorFigures::new(&off(0.1), &off(0.3), 0.8);
+        assert_eq!((better.excess(), better.strain()), (0.0, 0.0));
+        // A bound of 0 takes nothing but what adds nothing.
+        assert_eq!(ErrorFigures::new(&off(0.3), &off(0.3), 0.0).strain(), 0.0);
+        let none = ErrorFigures::new(&off(0.4), &off(0.3), 0.0).strain();
+        assert_eq!(none, f64::INFINITY);
+    }
+
+    #[test]
+    fn the_worst_tile_and_the_worst_view_are_bounded_too() {
+        // One view is a whole tile that is right, the other a quarter of a tile that is off by 0.5.
+        let white = reference(|_| (1.0, 1.0));
+        let good = || frame(&white, &[[WHITE; 16]]);
+        let bad = || frame(&white, &[[Some([0.5; 3]); 16]]);
+        let level = Details::new([(0, good()), (0, good()), (0, good()), (1, bad())]);
+        let original = Details::new([(0, good()), (0, good()), (0, good()), (1, good())]);
+        let figures = ErrorFigures::new(&level, &original, 0.25);
+        // A quarter of all pixels.
+        close(figures.excess(), 0.25);
+        close(figures.worst_view, 0.5);
+        close(figures.worst_tile, 0.5);
+        // 0.25 / e_a, 0.5 / 2 e_a, 0.5 / 4 e_a
+        close(figures.strain(), 1.0);
+        // A tile that is covered by less than a quarter counts as a quarter: 1 of 16 pixels.
+        let corner = reference(|i| (1.0, if i == 0 { 1.0 } else { 0.0 }));
+        let drawn = |c| std::array::from_fn(|i| if i == 0 { Some([c; 3]) } else { None });
+        let off = details(&corner, &[drawn(0.5)]);
+        let exact = details(&corner, &[drawn(1.0)]);
+        let figures = ErrorFigures::new(&off, &exact, 1.0);
+        close(figures.worst_tile, (0.25_f64 / 16.0).sqrt());
+        close(figures.worst_view, 0.5);
+    }
+
+    #[test]
+    fn tiles_of_eight_by_eight_pixels_are_apart() {
+        // Four times four pixels at (6, 0) reach into two tiles; the right half of them is wrong.
+        let white = Reference::new((0..16).map(|i| ([6 + i % 4, i / 4], [1.0; 3], 1.0)));
+        let level: Colours = std::array::from_fn(|i| if i % 4 < 2 { WHITE } else { BLACK });
+        let frame = frame(&white, &[level]);
+        // 8 pixels of a tile count as 16.
+        assert_eq!(frame.tiles, [0.0, 0.5]);
+    }
+
+    #[test]
+    fn shimmer_is_the_standard_deviation_from_offset_to_offset() {
+        // Two offsets: one pixel of sixteen shows 1, then 0.5. Variance of that pixel: 0.25^2 * 2 / (2 - 1).
+        let white = reference(|_| (1.0, 1.0));
+        let mut second = [WHITE; 16];
+        second[5] = Some([0.5; 3]);
+        let level = details(&white, &[[WHITE; 16], second]);
+        close(level.shimmer(), (0.125_f64 / 16.0).sqrt());
+        // Wrong, but always in the same way.
+        let steady = details(&white, &[[BLACK; 16], [BLACK; 16]]);
+        assert_eq!(steady.shimmer(), 0.0);
+        // The mean over both offsets: 0.25 / 32.
+        close(level.error.square(), 0.25 / 32.0);
+        let figures = ErrorFigures::new(&level, &details(&white, &[[WHITE; 16]; 2]), 0.2);
+        // 0.0884 of 0.1 shimmer, 0.0884 of 0.2 excess.
+        close(figures.strain(), 0.883_883_5);
+        // A pixel that comes and goes shimmers as its contrast with the backgrounds does: 1 over black, 0 over white.
+        let mut gone = [WHITE; 16];
+        gone[5] = None;
+        let flicker = details(&white, &[[WHITE; 16], gone]);
+        close(flicker.shimmer(), (0.5 * 0.5_f64 / 16.0).sqrt());
+    }
+
+    #[test]
+    fn a_nan_is_the_worst_error() {
+        let black = reference(|_| (0.0, 1.0));
+        let mut broken = [BLACK; 16];
+        broken[3] = Some([f32::NAN; 3]);
+        let level = details(&black, &[broken]);
+        close(level.error.square(), 1.0 / 16.0);
+        assert_eq!(level.error.max, 1.0);
+    }
+}
