@@ -2,7 +2,6 @@
 
 use super::body::{Body, Hidden, over_text, renamed_module, unwritable};
 use super::lock::FORMAT;
-use super::names::Names;
 use super::print::{Owner, Printed, Wishes, print, value_name};
 use super::source::{Keyword, Text};
 use super::splice::{sentence, with_line_ends};
@@ -10,6 +9,7 @@ use super::tokens::words;
 use super::{EmitLevel, file_name};
 use crate::Result;
 use crate::front::Source;
+use crate::front::identifiers::Names;
 use lodc_passes::shader::Stage;
 use std::collections::BTreeSet;
 

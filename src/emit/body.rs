@@ -1,10 +1,10 @@
 //! The text that levels are put behind, under names that hide nothing that a level needs.
 
-use super::names::Names;
 use super::print::Item;
 use super::source::{Keyword, Text};
 use super::{EmitLevel, file_name, flaw, read_back};
 use crate::front::Source;
+use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
 use naga::Module;
 use std::collections::{BTreeMap, BTreeSet};

@@ -3,15 +3,15 @@
 //! The module is written once, under its own names; from then on it is emitted as an author's text is.
 
 use super::body::unwritable;
-use super::names::Names;
 use super::print::{Wishes, print};
 use super::{alone, read_back};
 use crate::Result;
 use crate::front::Source;
-use naga::Module;
+use crate::front::identifiers::Names;
 use naga::diagnostic_filter::{
     FilterableTriggeringRule as Rule, Severity, StandardFilterableTriggeringRule as Standard,
 };
+use naga::{Handle, Module, Type, TypeInner};
 use std::borrow::Cow;
 
 /// The source as emission takes it: with a text that says all of it.
@@ -42,6 +42,22 @@ pub(crate) fn composed(source: &Source) -> Result<Cow<'_, Source>> {
         .collect();
     let text = alone::assembled("", &directives, &items);
     let mut composed = read_back(&text, source)?;
+    for (_, variable) in source.module.global_variables.iter() {
+        let declared = composed.module.global_variables.iter();
+        let again = declared.map(|(_, again)| again).find(|again| {
+            again.binding == variable.binding
+                && again.space == variable.space
+                && again.name == variable.name
+        });
+        let (Some(_), Some(again)) = (variable.binding, again) else {
+            continue;
+        };
+        if !same_layout((&source.module, variable.ty), (&composed.module, again.ty)) {
+            let name = variable.name.as_deref().unwrap_or("a buffer");
+            let reason = format!("WGSL cannot lay out `{name}` as it is");
+            return Err(unwritable(source, &reason));
+        }
+    }
     composed.name.clone_from(&source.name);
     Ok(Cow::Owned(composed))
 }
@@ -65,4 +81,80 @@ fn derivative_directive(module: &Module) -> Option<String> {
         Severity::Error => "error",
     };
     Some(format!("diagnostic({word}, derivative_uniformity);"))
+}
+
+/// Whether the host finds everything at the same bytes of two types.
+fn same_layout(a: (&Module, Handle<Type>), b: (&Module, Handle<Type>)) -> bool {
+    match (&a.0.types[a.1].inner, &b.0.types[b.1].inner) {
+        (
+            TypeInner::Struct { members, span },
+            TypeInner::Struct {
+                members: others,
+                span: other_span,
+            },
+        ) => {
+            span == other_span
+                && members.len() == others.len()
+                && members.iter().zip(others).all(|(one, other)| {
+                    one.offset == other.offset && same_layout((a.0, one.ty), (b.0, other.ty))
+                })
+        }
+        (
+            TypeInner::Array { base, size, stride },
+            TypeInner::Array {
+                base: other,
+                size: other_size,
+                stride: other_stride,
+            },
+        ) => {
+            size == other_size && stride == other_stride && same_layout((a.0, *base), (b.0, *other))
+        }
+        (TypeInner::BindingArray { base, .. }, TypeInner::BindingArray { base: other, .. }) => {
+            same_layout((a.0, *base), (b.0, *other))
+        }
+        (one, other) => one == other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A source as if it had been composed, so that its module is what there is of it.
+    fn module_of(text: &str) -> Source {
+        Source {
+            verbatim: false,
+            ..Source::parse("a.wgsl", text).unwrap_or_else(|e| panic!("{e}"))
+        }
+    }
+
+    #[test]
+    fn layouts_stay_where_the_author_widened_them() {
+        let source = module_of(
+            "struct Lamp { @size(32) power: f32, at: vec3f, @size(32) tint: vec3f }
+            struct Scene { @align(16) count: u32, @align(64) lamps: array<Lamp, 4>, last: f32 }
+            @group(0) @binding(0) var<uniform> scene: Scene;
+            @fragment fn fs() -> @location(0) vec4f {
+                return vec4f(scene.lamps[1].at * scene.lamps[2].tint, scene.last + scene.lamps[0].power);
+            }",
+        );
+        let written = composed(&source).unwrap_or_else(|e| panic!("{e}"));
+        for part in [
+            "@size(32) power: f32",
+            "@size(32) tint: vec3f",
+            "@size(64) count: u32",
+        ] {
+            assert!(written.text.contains(part), "{}", written.text);
+        }
+    }
+
+    #[test]
+    fn a_text_of_wgsl_is_itself() {
+        let source = Source::parse(
+            "a.wgsl",
+            "@fragment fn f() -> @location(0) vec4f { return vec4f(); }",
+        );
+        let source = source.unwrap_or_else(|e| panic!("{e}"));
+        assert!(matches!(composed(&source), Ok(Cow::Borrowed(_))));
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::Form;
 use super::body::Body;
-use super::names::Names;
+use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
 use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
 

@@ -16,7 +16,6 @@ mod composed;
 mod control;
 mod lines;
 mod lock;
-mod names;
 mod print;
 mod says;
 mod source;

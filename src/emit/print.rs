@@ -5,14 +5,15 @@
 //! by word. Values that the writer numbers (`_e17`) get readable names on the way.
 
 use super::lines;
-use super::names::{Names, letters};
 use super::source::{Keyword, Text};
 use super::tidy::{Style, tidy, with_short_types};
 use super::tokens::{Kind, tokens, words};
 use crate::front;
+use crate::front::identifiers::{Names, letters};
 use lodc_passes::shader::Stage;
 use naga::back::wgsl::WriterFlags;
-use naga::{Expression, Function, Handle, Module, Type, TypeInner};
+use naga::proc::Layouter;
+use naga::{AddressSpace, Expression, Function, Handle, Module, Type, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -78,7 +79,8 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
         name
     };
 
-    label_types(&mut module, &mut labels, &mut global);
+    let padding = padding(&module);
+    label_types(&mut module, &mut labels, &padding, &mut global);
     for (_, variable) in module.global_variables.iter_mut() {
         variable.name = Some(labels.add(global(variable.name.as_deref(), "binding")));
     }
@@ -91,7 +93,7 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
         constant.name = Some(labels.add(global(constant.name.as_deref(), "setting")));
     }
     for (_, function) in module.functions.iter_mut() {
-        function.name = Some(labels.add(global(function.name.as_deref(), "function")));
+        function.name = Some(labels.add(global(function.name.as_deref(), "main")));
     }
     for entry in &mut module.entry_points {
         entry.name = labels.add(global(Some(&entry.name), "entry"));
@@ -174,10 +176,60 @@ pub(crate) fn print(module: &Module, wishes: &Wishes<'_>) -> Result<Printed, Str
     Ok(printed)
 }
 
+/// The members of structs in the host's buffers that take more bytes than WGSL gives them, with those bytes: the
+/// writer leaves out what the author, or another language, says of a struct's layout.
+fn padding(module: &Module) -> BTreeMap<(Handle<Type>, usize), u32> {
+    let mut padding = BTreeMap::new();
+    let mut layouter = Layouter::default();
+    if layouter.update(module.to_ctx()).is_err() {
+        // The validator says what is wrong.
+        return padding;
+    }
+    let mut seen = BTreeSet::new();
+    let mut wanted: Vec<Handle<Type>> = module
+        .global_variables
+        .iter()
+        .filter(|(_, variable)| {
+            matches!(
+                variable.space,
+                AddressSpace::Uniform | AddressSpace::Storage { .. } | AddressSpace::Immediate
+            )
+        })
+        .map(|(_, variable)| variable.ty)
+        .collect();
+    while let Some(ty) = wanted.pop() {
+        if !seen.insert(ty) {
+            continue;
+        }
+        match &module.types[ty].inner {
+            TypeInner::Array { base, .. } | TypeInner::BindingArray { base, .. } => {
+                wanted.push(*base);
+            }
+            TypeInner::Struct { members, span } => {
+                wanted.extend(members.iter().map(|member| member.ty));
+                for (at, member) in members.iter().enumerate() {
+                    let size = module.types[member.ty].inner.size(module.to_ctx());
+                    let end = member.offset + size;
+                    let (natural, next) = match members.get(at + 1) {
+                        Some(next) => (layouter[next.ty].alignment.round_up(end), next.offset),
+                        None => (layouter[ty].alignment.round_up(end), *span),
+                    };
+                    if next > natural {
+                        padding.insert((ty, at), next - member.offset);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    padding
+}
+
 /// Gives structs and their members placeholders. Predeclared ones keep their members' names.
 fn label_types(
     module: &mut Module,
     labels: &mut Labels,
+    padding: &BTreeMap<(Handle<Type>, usize), u32>,
     global: &mut dyn FnMut(Option<&str>, &str) -> String,
 ) {
     let special = &module.special_types;
@@ -199,10 +251,14 @@ fn label_types(
         }
         ty.name = Some(labels.add(global(ty.name.as_deref(), "Block")));
         let mut used = Names::default();
-        for member in members {
+        for (at, member) in members.iter_mut().enumerate() {
             let name = member.name.as_deref().unwrap_or("member");
             let name = used.take_member(name);
-            member.name = Some(labels.add(name));
+            let label = labels.add(name);
+            if let Some(bytes) = padding.get(&(handle, at)) {
+                labels.sizes.insert(label.clone(), *bytes);
+            }
+            member.name = Some(label);
         }
         module.types.replace(handle, ty);
     }
@@ -212,6 +268,8 @@ fn label_types(
 #[derive(Default)]
 struct Labels {
     names: BTreeMap<String, String>,
+    /// The bytes of members that take more than WGSL gives them.
+    sizes: BTreeMap<String, u32>,
 }
 
 impl Labels {
@@ -245,6 +303,10 @@ impl Labels {
                 (None, Some(name)) => {
                     if !after_point {
                         uses.insert(name.clone());
+                    }
+                    // Outside of functions a member is named where it is declared alone.
+                    if let (None, Some(bytes)) = (&scope, self.sizes.get(word)) {
+                        out.push_str(&format!("@size({bytes}) "));
                     }
                     out.push_str(name);
                 }

@@ -3,10 +3,10 @@
 use super::body::{Body, Hidden, over_text, renamed_module, unwritable};
 use super::control::Control;
 use super::lock::FORMAT;
-use super::names::{Names, in_words};
 use super::print::{Item, Owner, Printed, Wishes, print, value_name};
 use super::{EmitLevel, Form, file_name, flaw};
 use crate::front::Source;
+use crate::front::identifiers::{Names, in_words};
 use crate::{Diagnostic, Result};
 use lodc_passes::shader::Stage;
 use std::collections::BTreeSet;

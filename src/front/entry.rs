@@ -41,7 +41,8 @@ pub fn inputs(source: &Source, entry: usize) -> Vec<Input> {
         match (&argument.binding, &module.types[argument.ty].inner) {
             (Some(binding), _) => {
                 let name = argument.name.clone().unwrap_or_default();
-                // naga keeps no span of an argument: it is the first such word after the function's name.
+                // naga keeps no span of an argument: it is the first such word after the function's name. In GLSL
+                // it is a variable at module scope.
                 let span = source.files().find_map(|file| {
                     let text = file.text;
                     let at = function_name(text, &entry.name)?;
@@ -49,10 +50,12 @@ pub fn inputs(source: &Source, entry: usize) -> Vec<Input> {
                     Some(file.span(at))
                 });
                 inputs.push(Input {
-                    name,
                     binding: binding.clone(),
                     ty: argument.ty,
-                    span: span.unwrap_or_default(),
+                    span: span
+                        .or_else(|| declared_outside(source, &name))
+                        .unwrap_or_default(),
+                    name,
                 });
             }
             (None, TypeInner::Struct { members, .. }) => {
@@ -78,6 +81,26 @@ pub fn inputs(source: &Source, entry: usize) -> Vec<Input> {
         }
     }
     inputs
+}
+
+/// Where a variable, or a member of a block of variables, is declared at module scope.
+fn declared_outside(source: &Source, name: &str) -> Option<Span> {
+    let module = &source.module;
+    let mut variables = module.global_variables.iter();
+    variables.find_map(|(handle, variable)| {
+        let in_block = || match &module.types[variable.ty].inner {
+            TypeInner::Struct { members, .. } => {
+                members.iter().any(|m| m.name.as_deref() == Some(name))
+            }
+            _ => false,
+        };
+        if variable.name.as_deref() != Some(name) && !in_block() {
+            return None;
+        }
+        let place = source.place(module.global_variables.get_span(handle))?;
+        let at = whole_word(place.file.text, place.range, name)?;
+        Some(place.file.span(at))
+    })
 }
 
 /// Chooses the vertex (or none) and the fragment entry point, and checks that they fit together.

@@ -1,4 +1,4 @@
-//! Reading shaders: a WGSL file becomes a validated naga module with its two entry points chosen.
+//! Reading shaders: a WGSL or GLSL file becomes a validated naga module with its two entry points chosen.
 //!
 //! ```text
 //! path --read--> text --parse--> Module --validate--> ModuleInfo --choose--> Source
@@ -10,9 +10,13 @@
 mod entry;
 mod feed;
 mod files;
+mod glsl;
+pub(crate) mod identifiers;
 mod link;
+mod lower;
 pub(crate) mod names;
 mod parse;
+mod settle;
 mod vertex_stage;
 
 pub use entry::{Input, Stages, inputs};
@@ -51,10 +55,13 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a `.wgsl` file with one fragment entry point and at most one vertex entry point.
+    /// Reads a shader, in the language that the file's name says, with one fragment entry point and at most one
+    /// vertex entry point. Of GLSL, which has a file a stage, the vertex stage is that of the file beside it that is
+    /// called alike, `rock.vert` beside `rock.frag`, when there is one.
     ///
     /// # Errors
-    /// When the file cannot be read, is not WGSL, is not valid, or has another number of entry points.
+    /// When the file cannot be read, is in no language that lodc reads, is not valid, or has another number of
+    /// entry points.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_stages(path, &Stages::default())
     }
@@ -67,8 +74,9 @@ impl Source {
         let name = path.display().to_string();
         // Before the extension: a folder has none, and that is not what is wrong with it.
         let text = read_text(path, "shader");
-        parse::expect_wgsl(path, &name, text.is_ok())?;
-        let mut source = match &stages.vertex_file {
+        parse::expect_known(path, &name, text.is_ok())?;
+        let beside = parse::vertex_beside(path);
+        let mut source = match stages.vertex_file.as_ref().or(beside.as_ref()) {
             None => Self::parse_stages(&name, text?, stages)?,
             Some(vertex) => Self::parsed(&name, text?)?.with_vertex(vertex, stages)?,
         };
@@ -76,10 +84,11 @@ impl Source {
         Ok(source)
     }
 
-    /// Parses a text; `name` is what messages call it.
+    /// Parses a text; `name` is what messages call it, and its extension says what language it is in: WGSL,
+    /// unless it is one of GLSL.
     ///
     /// # Errors
-    /// When it is not valid WGSL, or has not one fragment and at most one vertex entry point.
+    /// When it is not valid, or has not one fragment and at most one vertex entry point.
     pub fn parse(name: &str, text: impl Into<String>) -> Result<Self> {
         Self::parse_stages(name, text, &Stages::default())
     }
@@ -96,13 +105,14 @@ impl Source {
 
     /// A text with no entry point chosen yet.
     fn parsed(name: &str, text: String) -> Result<Self> {
-        let (module, info) = parse::parse(name, &text)?;
+        let language = parse::language(Path::new(name)).unwrap_or_default();
+        let (module, info) = parse::parse(name, &text, language)?;
         Ok(Self {
             name: name.to_owned(),
             path: None,
             text,
             others: Vec::new(),
-            verbatim: true,
+            verbatim: language == parse::Language::Wgsl,
             module,
             info,
             vertex: None,
@@ -114,9 +124,10 @@ impl Source {
     fn with_vertex(mut self, path: &Path, stages: &Stages) -> Result<Self> {
         let name = path.display().to_string();
         let text = read_text(path, "shader");
-        parse::expect_wgsl(path, &name, text.is_ok())?;
+        parse::expect_vertex(path, &name, text.is_ok())?;
         let text = text?;
-        let (module, _) = parse::parse(&name, &text)?;
+        let written_in = parse::language(path).unwrap_or_default();
+        let (module, _) = parse::parse(&name, &text, written_in)?;
         let wanted = stages.vertex.as_deref();
         let Some(vertex) = entry::pick(&name, &text, &module, ShaderStage::Vertex, wanted)? else {
             return Err(
@@ -290,7 +301,7 @@ pub fn read_text(path: &Path, kind: &str) -> Result<String> {
     };
     if bytes.starts_with(&[3, 2, 35, 7]) || bytes.starts_with(&[7, 35, 2, 3]) {
         return Err(Diagnostic::error(format!("`{name}` is a SPIR-V binary"))
-            .with_note("this build reads WGSL text only"));
+            .with_note("this build reads WGSL and GLSL text"));
     }
     match String::from_utf8(bytes) {
         Ok(text) if text.contains('\0') => Err(Diagnostic::error(format!(
@@ -398,10 +409,10 @@ mod tests {
                 "is a SPIR-V binary",
             ),
             (
-                bad("a.glsl", PLAIN),
-                "is GLSL, which this build does not read",
+                bad("a.hlsl", PLAIN),
+                "is HLSL, which this build does not read",
             ),
-            (bad("a.txt", PLAIN), "is not a `.wgsl` file"),
+            (bad("a.txt", PLAIN), "is not a shader that lodc reads"),
         ] {
             assert!(error.message.contains(part), "{error}");
         }

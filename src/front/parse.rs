@@ -1,11 +1,12 @@
-//! WGSL to a validated module, with naga's errors as diagnostics in the user's file.
+//! A text to a validated module, with naga's errors as diagnostics in the user's file.
 
 use super::names::whole_word;
+use super::{glsl, settle};
 use crate::{Diagnostic, Result};
 use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
-use naga::{Block, Module, Span, Statement, WithSpan};
+use naga::{Block, Module, ShaderStage, Span, Statement, WithSpan};
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a shader may use: all that an engine could switch on. The evaluator refuses what it does not run
 /// with a message of its own, at the expression.
@@ -35,15 +36,79 @@ pub fn validate(
         .map_err(Box::new)
 }
 
-/// Refuses files that are not WGSL by their names.
-pub(super) fn expect_wgsl(path: &Path, name: &str, readable: bool) -> Result<()> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    if !readable || extension.eq_ignore_ascii_case("wgsl") {
+/// What a file is written in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Language {
+    #[default]
+    Wgsl,
+    /// GLSL, which has a file a stage.
+    Glsl(ShaderStage),
+}
+
+/// The language that a file's name says, when lodc reads it.
+pub(super) fn language(path: &Path) -> Option<Language> {
+    let extension = |path: &Path| Some(path.extension()?.to_str()?.to_ascii_lowercase());
+    let of_stage = |extension: &str| match extension {
+        "vert" | "vs" => Some(Language::Glsl(ShaderStage::Vertex)),
+        "frag" | "fs" => Some(Language::Glsl(ShaderStage::Fragment)),
+        _ => None,
+    };
+    match extension(path)?.as_str() {
+        "wgsl" => Some(Language::Wgsl),
+        // `rock.frag.glsl`; without a stage it is the one that shades.
+        "glsl" => {
+            let stage = path.file_stem().map(Path::new).and_then(extension);
+            let named = stage.as_deref().and_then(of_stage);
+            Some(named.unwrap_or(Language::Glsl(ShaderStage::Fragment)))
+        }
+        other => of_stage(other),
+    }
+}
+
+/// The GLSL vertex shader beside a fragment shader, called alike.
+pub(super) fn vertex_beside(path: &Path) -> Option<PathBuf> {
+    if language(path) != Some(Language::Glsl(ShaderStage::Fragment)) {
+        return None;
+    }
+    let name = path.file_name()?.to_str()?;
+    let (stem, rest) = match name.strip_suffix(".glsl") {
+        Some(before) => (before, ".glsl"),
+        None => (name, ""),
+    };
+    let (stem, vertex) = match stem.rsplit_once('.')? {
+        (stem, "fs") => (stem, "vs"),
+        (stem, _) => (stem, "vert"),
+    };
+    let beside = path.with_file_name(format!("{stem}.{vertex}{rest}"));
+    beside.is_file().then_some(beside)
+}
+
+/// Refuses a file that cannot have a vertex stage, by its name.
+pub(super) fn expect_vertex(path: &Path, name: &str, readable: bool) -> Result<()> {
+    match language(path) {
+        Some(Language::Glsl(ShaderStage::Vertex)) => Ok(()),
+        Some(Language::Glsl(_)) => Err(Diagnostic::error(format!(
+            "`{name}` is a GLSL fragment shader, by its name: it has no vertex stage"
+        ))
+        .with_note("a GLSL vertex shader is called `.vert`")),
+        _ => expect_known(path, name, readable),
+    }
+}
+
+/// Refuses files that are in no language that lodc reads, by their names.
+pub(super) fn expect_known(path: &Path, name: &str, readable: bool) -> Result<()> {
+    let vertex = Language::Glsl(ShaderStage::Vertex);
+    if !readable || language(path).is_some_and(|known| known != vertex) {
         return Ok(());
     }
-    let lower = extension.to_ascii_lowercase();
-    let language = match lower.as_str() {
-        "glsl" | "vert" | "frag" | "vs" | "fs" | "comp" => "GLSL",
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    let language = match extension.to_ascii_lowercase().as_str() {
+        "vert" | "vs" | "comp" | "geom" | "tesc" | "tese" => {
+            return Err(Diagnostic::error(format!(
+                "`{name}` is no fragment shader: lodc works on the stage that shades"
+            ))
+            .with_note("name the fragment shader, `.frag`"));
+        }
         "hlsl" | "fx" | "hlsli" | "cginc" | "shader" => "HLSL",
         "wesl" => "WESL",
         "slang" => "Slang",
@@ -52,8 +117,8 @@ pub(super) fn expect_wgsl(path: &Path, name: &str, readable: bool) -> Result<()>
         _ => "",
     };
     Err(match language {
-        "" => Diagnostic::error(format!("`{name}` is not a `.wgsl` file"))
-            .with_note("lodc reads WGSL shaders; give the file the extension `.wgsl` if it is one"),
+        "" => Diagnostic::error(format!("`{name}` is not a shader that lodc reads, by its name"))
+            .with_note("lodc reads WGSL (`.wgsl`) and GLSL fragment shaders (`.frag`): give the file that extension if it is one"),
         language => Diagnostic::error(format!(
             "`{name}` is {language}, which this build does not read"
         ))
@@ -62,11 +127,17 @@ pub(super) fn expect_wgsl(path: &Path, name: &str, readable: bool) -> Result<()>
 }
 
 /// Parses and validates a text.
-pub(super) fn parse(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
+pub(super) fn parse(name: &str, text: &str, language: Language) -> Result<(Module, ModuleInfo)> {
     if text.trim().is_empty() {
-        return Err(Diagnostic::error(format!("`{name}` is empty")).with_note(
-            "a material shader has at least a fragment entry point: `@fragment fn ...`",
-        ));
+        let example = match language {
+            Language::Wgsl => "@fragment fn ...",
+            Language::Glsl(_) => "void main() { ... }",
+        };
+        return Err(
+            Diagnostic::error(format!("`{name}` is empty")).with_note(format!(
+                "a material shader has at least a fragment entry point: `{example}`"
+            )),
+        );
     }
     if text.len() > LARGEST {
         return Err(Diagnostic::error(format!(
@@ -78,21 +149,31 @@ pub(super) fn parse(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
     std::thread::scope(|scope| {
         std::thread::Builder::new()
             .stack_size(STACK)
-            .spawn_scoped(scope, || parse_here(name, text))
+            .spawn_scoped(scope, || parse_here(name, text, language))
             .map_err(|error| Diagnostic::error(format!("cannot start a thread: {error}")))?
             .join()
             .unwrap_or_else(|_| {
-                Err(
-                    Diagnostic::error(format!("naga broke down on `{name}`")).with_note(
-                        "this is a bug in naga's WGSL reader: please report it with the file",
-                    ),
-                )
+                Err(Diagnostic::error(format!("naga broke down on `{name}`"))
+                    .with_note("this is a bug in naga's reader: please report it with the file"))
             })
     })
 }
 
-fn parse_here(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
-    let module = naga::front::wgsl::parse_str(text).map_err(|error| {
+fn parse_here(name: &str, text: &str, language: Language) -> Result<(Module, ModuleInfo)> {
+    let module = match language {
+        Language::Wgsl => wgsl(name, text)?,
+        Language::Glsl(stage) => {
+            let mut module = glsl::parse(name, text, stage)?;
+            settle::settle(&mut module);
+            module
+        }
+    };
+    let info = checked(name, text, &module)?;
+    Ok((module, info))
+}
+
+fn wgsl(name: &str, text: &str) -> Result<Module> {
+    naga::front::wgsl::parse_str(text).map_err(|error| {
         if let Some(foreign) = foreign_directive(name, text) {
             return foreign;
         }
@@ -101,7 +182,11 @@ fn parse_here(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
             .labels()
             .fold(located, |d, (span, remark)| at(d, span, remark));
         error.notes().fold(labelled, |d, note| d.with_reason(note))
-    })?;
+    })
+}
+
+/// Validates a module that was parsed from a text.
+fn checked(name: &str, text: &str, module: &Module) -> Result<ModuleInfo> {
     // Here, where the stack is deep enough even to drop what is too deep for everyone else.
     let functions = module.functions.iter().map(|(_, f)| f);
     let entries = module.entry_points.iter().map(|e| &e.function);
@@ -114,7 +199,7 @@ fn parse_here(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
                 .with_note("split the function, or turn a chain of `else if` into a `switch`"));
         }
     }
-    let info = validate(&module).map_err(|error| {
+    validate(module).map_err(|error| {
         // The outermost says which function, the innermost what is wrong.
         let mut reasons = Vec::new();
         let mut next: Option<&dyn Error> = error.as_inner().source();
@@ -139,8 +224,7 @@ fn parse_here(name: &str, text: &str) -> Result<(Module, ModuleInfo)> {
         reasons
             .iter()
             .fold(labelled, |d, reason| d.with_reason(uncapitalised(reason)))
-    })?;
-    Ok((module, info))
+    })
 }
 
 /// Where statements are nested deeper than `left` more blocks.
@@ -198,7 +282,11 @@ fn foreign_directive(name: &str, text: &str) -> Option<Box<Diagnostic>> {
     None
 }
 
-fn at(diagnostic: Box<Diagnostic>, span: Span, remark: impl Into<String>) -> Box<Diagnostic> {
+pub(super) fn at(
+    diagnostic: Box<Diagnostic>,
+    span: Span,
+    remark: impl Into<String>,
+) -> Box<Diagnostic> {
     match span.to_range() {
         Some(range) => diagnostic.with_label(range, remark),
         None => diagnostic,
@@ -229,7 +317,7 @@ fn readable(remark: &str) -> &str {
 
 /// A message of naga in the manner of ours: no capital, no full stop, types as WGSL writes them, and no arena
 /// indices (`[12]`), which say nothing to a shader's author.
-fn uncapitalised(message: &str) -> String {
+pub(super) fn uncapitalised(message: &str) -> String {
     let mut plain = String::new();
     let mut rest = message.trim_end_matches('.');
     while let Some(open) = rest.find(" [") {
@@ -306,7 +394,7 @@ mod tests {
     use super::*;
 
     fn refused(text: &str) -> Box<Diagnostic> {
-        parse("a.wgsl", text).expect_err(text)
+        parse("a.wgsl", text, Language::Wgsl).expect_err(text)
     }
 
     #[test]
@@ -381,20 +469,21 @@ mod tests {
                 .message
                 .contains("expected")
         );
-        assert!(parse("a.wgsl", "/*\n#import x\n*/ fn f() {}").is_ok());
+        assert!(parse("a.wgsl", "/*\n#import x\n*/ fn f() {}", Language::Wgsl).is_ok());
     }
 
     #[test]
     fn other_languages_are_named() {
         for (file, part) in [
-            ("a.frag", "GLSL"),
+            ("a.vert", "no fragment shader"),
             ("a.hlsl", "HLSL"),
-            ("a.txt", "not a `.wgsl` file"),
+            ("a.txt", "not a shader that lodc reads"),
         ] {
-            let error = expect_wgsl(Path::new(file), file, true).unwrap_err();
+            let error = expect_known(Path::new(file), file, true).unwrap_err();
             assert!(error.message.contains(part), "{error}");
         }
-        assert!(expect_wgsl(Path::new("a.WGSL"), "a", true).is_ok());
+        assert!(expect_known(Path::new("a.WGSL"), "a", true).is_ok());
+        assert!(expect_known(Path::new("a.FRAG"), "a", true).is_ok());
     }
 
     #[test]
@@ -430,7 +519,7 @@ mod tests {
                 "}".repeat(n)
             )
         };
-        assert!(parse("a.wgsl", &nested(100)).is_ok());
+        assert!(parse("a.wgsl", &nested(100), Language::Wgsl).is_ok());
         let chain = format!(
             "fn f(a: bool) {{ {} {{}} }}",
             "if a {} else ".repeat(DEEPEST + 2)
@@ -465,7 +554,7 @@ mod tests {
                 ", 1>".repeat(n)
             ),
         ] {
-            let _ = parse("a.wgsl", &text);
+            let _ = parse("a.wgsl", &text, Language::Wgsl);
         }
     }
 }

@@ -388,14 +388,19 @@ impl Inliner<'_> {
                 span: place(self.entry),
             });
         }
-        let name = function.name.as_deref().unwrap_or("call");
-        let mut path = format!("{}.{name}", caller.path);
-        let calls = self.calls.entry(path.clone()).or_insert(0);
-        *calls += 1;
-        if *calls > 1 {
-            path = format!("{path}_{calls}");
-        }
-        let path: Arc<str> = path.into();
+        // A function without a name is a part of its caller that a reader put apart.
+        let path: Arc<str> = match function.name.as_deref() {
+            None => caller.path.clone(),
+            Some(name) => {
+                let mut path = format!("{}.{name}", caller.path);
+                let calls = self.calls.entry(path.clone()).or_insert(0);
+                *calls += 1;
+                if *calls > 1 {
+                    path = format!("{path}_{calls}");
+                }
+                path.into()
+            }
+        };
         for (argument, value) in function.arguments.iter().zip(&arguments) {
             if let Some(name) = &argument.name {
                 self.name(*value, name, &path);

@@ -1,4 +1,4 @@
-//! Names: which ones WGSL keeps for itself, how a unique one is found, how a wish becomes one.
+//! Names of WGSL: which ones it keeps for itself, how a unique one is found, how a wish becomes one.
 
 use naga::keywords::wgsl::{BUILTIN_IDENTIFIERS, RESERVED};
 use std::collections::BTreeSet;
