@@ -10,7 +10,7 @@ mod search;
 pub use search::{Compiled, compile, inspect};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
-use crate::front::{Source, Stages};
+use crate::front::{Modules, Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Shader, normalize};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,8 @@ pub struct Request {
     pub output: Option<PathBuf>,
     /// The entry points, where there are several.
     pub stages: Stages,
+    /// The modules that may be imported.
+    pub modules: Modules,
     /// The form to write; by default that of the lock when it is replayed, else [`Form::Override`].
     pub form: Option<Form>,
     /// The language to write; by default that of the lock when it is replayed, else [`Target::Wgsl`].
@@ -158,7 +160,19 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
             Some(folder.join(file))
         }),
     };
-    let source = Source::read_stages(&request.shader, &stages)?;
+    let modules = match request.modules == Modules::default() {
+        true => Modules {
+            folders: lock
+                .modules
+                .folders
+                .iter()
+                .map(|f| folder.join(f))
+                .collect(),
+            definitions: lock.modules.definitions.clone(),
+        },
+        false => request.modules.clone(),
+    };
+    let source = Source::read_with(&request.shader, &stages, &modules)?;
     let base = normal_form(&source)?;
     let levels = lock.replay(&base, &path.display().to_string(), &text)?;
     let changed = |file: &str, hash: &str| {

@@ -4,7 +4,7 @@ mod progress;
 
 use crate::compile::{self, Request};
 use crate::emit::{self, Form, Target};
-use crate::front::Stages;
+use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
 use progress::Bar;
@@ -52,6 +52,12 @@ struct InputArgs {
     /// The file with the vertex stage, where it is another one
     #[arg(long, value_name = "FILE")]
     vertex_file: Option<PathBuf>,
+    /// A folder with modules that the shader imports, searched with all its folders [default: the shader's own]
+    #[arg(short = 'I', long = "include", value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+    /// A shader def for `#ifdef`, `#if` and `#{NAME}`: true, false or a whole number [default: true]
+    #[arg(short = 'D', long = "define", value_name = "NAME[=VALUE]")]
+    definitions: Vec<String>,
 }
 
 #[derive(Debug, Args)]
@@ -108,8 +114,14 @@ fn print(text: &str) {
 }
 
 impl InputArgs {
-    fn request(self) -> Request {
-        Request {
+    fn request(self) -> Result<Request> {
+        let definitions = self.definitions.iter();
+        let definitions = definitions.map(|text| Definition::of_text(text));
+        Ok(Request {
+            modules: Modules {
+                folders: self.folders,
+                definitions: definitions.collect::<Result<_>>()?,
+            },
             // The parser has asked for it.
             shader: self.shader.unwrap_or_default(),
             scene: self.scene,
@@ -119,17 +131,17 @@ impl InputArgs {
                 vertex_file: self.vertex_file,
             },
             ..Request::default()
-        }
+        })
     }
 }
 
 fn inspect(input: InputArgs) -> Result<()> {
-    print(&compile::inspect(&input.request())?);
+    print(&compile::inspect(&input.request()?)?);
     Ok(())
 }
 
 fn compile_command(arguments: CompileArgs) -> Result<()> {
-    let mut request = arguments.input.request();
+    let mut request = arguments.input.request()?;
     request.output = arguments.output;
     request.form = arguments.form;
     request.target = arguments.target;

@@ -5,7 +5,7 @@ use crate::emit::{self, EmitLevel, Lock, Output, figure};
 use crate::eval::program::{Program, Refused};
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
-use crate::scene::{Scene, SceneTexture};
+use crate::scene::{Reading, Scene, SceneTexture};
 use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, cost};
@@ -26,6 +26,8 @@ pub struct Compiled {
 
 /// Everything that a search stands on.
 struct Ready {
+    /// The request, with what the scene says of how the shader is read.
+    request: Request,
     source: Source,
     scene: Scene,
     /// The scene file, when there is one.
@@ -35,18 +37,30 @@ struct Ready {
 
 impl Ready {
     fn read(request: &Request) -> Result<Self> {
-        let source = Source::read_stages(&request.shader, &request.stages)?;
         let beside = request.shader.with_extension("toml");
         let scene_file = request
             .scene
             .clone()
             .or_else(|| beside.is_file().then_some(beside));
+        let mut request = request.clone();
+        // A shader that is not there is the better message.
+        if let Some(file) = scene_file.as_deref().filter(|_| request.shader.exists()) {
+            let reading = Reading::read(file)?;
+            let stages = &mut request.stages;
+            stages.vertex_file = stages.vertex_file.take().or(reading.vertex_file);
+            let mut modules = reading.modules;
+            modules.folders.append(&mut request.modules.folders);
+            modules.definitions.append(&mut request.modules.definitions);
+            request.modules = modules;
+        }
+        let source = Source::read_with(&request.shader, &request.stages, &request.modules)?;
         // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
         let fragment = base.index(Stage::Fragment).unwrap_or(0);
         Program::compile(base.module(), fragment, &[]).map_err(|what| refused(&source, &what))?;
         let scene = Scene::read(&source, scene_file.as_deref())?;
         Ok(Self {
+            request,
             source,
             scene,
             scene_file,
@@ -222,17 +236,28 @@ impl Ready {
             source: emit::LockedSource {
                 file: relative(folder, &request.shader),
                 normal_form: self.base.fingerprint().to_string(),
-                vertex: match &request.stages.vertex_file {
+                vertex: match &self.request.stages.vertex_file {
                     // In a file of its own it may have had another name.
-                    Some(_) => request.stages.vertex.clone(),
+                    Some(_) => self.request.stages.vertex.clone(),
                     None => self.source.vertex.clone(),
                 },
-                vertex_file: request
+                vertex_file: self
+                    .request
                     .stages
                     .vertex_file
                     .as_ref()
                     .map(|file| relative(folder, file)),
                 fragment: self.source.fragment.clone(),
+            },
+            modules: emit::LockedModules {
+                folders: self
+                    .request
+                    .modules
+                    .folders
+                    .iter()
+                    .map(|searched| relative(folder, searched))
+                    .collect(),
+                definitions: self.request.modules.definitions.clone(),
             },
             scene: self.scene_file.as_ref().map(|file| emit::LockedFile {
                 file: relative(folder, file),

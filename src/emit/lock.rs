@@ -8,7 +8,7 @@
 //! hexadecimal. The bits decide.
 
 use super::{EmitLevel, Output};
-use crate::front::read_text;
+use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Candidate, PASSES, Recipe, Shader};
 use serde::Deserialize;
@@ -25,6 +25,8 @@ pub const FORMAT: u32 = 1;
 pub struct Lock {
     /// The shader that it was made from.
     pub source: LockedSource,
+    /// What it was composed with.
+    pub modules: LockedModules,
     /// The scene file that errors were measured over; `None` when there was none, and all was inferred.
     pub scene: Option<LockedFile>,
     /// Every texture whose texels went into a number of a recipe.
@@ -52,6 +54,15 @@ pub struct LockedSource {
     pub vertex_file: Option<String>,
     /// The fragment entry point.
     pub fragment: String,
+}
+
+/// The module folders and shader defs of a lock.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LockedModules {
+    /// The folders, relative to the lock.
+    pub folders: Vec<String>,
+    /// The shader defs, in order.
+    pub definitions: Vec<Definition>,
 }
 
 /// A file of a lock.
@@ -135,6 +146,17 @@ impl Lock {
             string(&source.normal_form),
             string(&source.fragment)
         ));
+        let modules = &self.modules;
+        if *modules != LockedModules::default() {
+            let folders: Vec<String> = modules.folders.iter().map(|f| string(f)).collect();
+            let definitions = modules.definitions.iter();
+            let definitions: Vec<String> = definitions.map(|d| string(&d.to_string())).collect();
+            line(format!(
+                "modules = {{ folders = [{}], definitions = [{}] }}",
+                folders.join(", "),
+                definitions.join(", ")
+            ));
+        }
         if let Some(scene) = &self.scene {
             line(format!(
                 "scene = {{ file = {}, hash = {} }}",
@@ -263,6 +285,18 @@ impl Lock {
                 vertex: raw.source.vertex,
                 vertex_file: raw.source.vertex_file,
                 fragment: raw.source.fragment,
+            },
+            modules: LockedModules {
+                folders: raw.modules.folders,
+                definitions: raw
+                    .modules
+                    .definitions
+                    .iter()
+                    .map(|text| {
+                        let read = Definition::of_text(text.get_ref());
+                        read.map_err(|error| at(error.message, text.span(), "here"))
+                    })
+                    .collect::<Result<_>>()?,
             },
             scene: raw.scene,
             textures: raw.textures,
@@ -414,6 +448,8 @@ struct RawLock {
     #[serde(rename = "format")]
     _format: i64,
     source: RawSource,
+    #[serde(default)]
+    modules: RawModules,
     scene: Option<LockedFile>,
     #[serde(default)]
     textures: Vec<LockedTexture>,
@@ -433,6 +469,15 @@ struct RawSource {
     vertex: Option<String>,
     vertex_file: Option<String>,
     fragment: String,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawModules {
+    #[serde(default)]
+    folders: Vec<String>,
+    #[serde(default)]
+    definitions: Vec<Spanned<String>>,
 }
 
 #[derive(Deserialize)]
@@ -519,6 +564,12 @@ mod tests {
                 vertex: None,
                 vertex_file: None,
                 fragment: "fs_wall".into(),
+            },
+            modules: LockedModules {
+                folders: vec!["../shared \"modules\"".into()],
+                definitions: ["A", "B=8", "C=-1"]
+                    .map(|text| Definition::of_text(text).expect("it is a shader def"))
+                    .to_vec(),
             },
             scene: Some(LockedFile {
                 file: "brick.toml".into(),

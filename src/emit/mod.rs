@@ -28,7 +28,9 @@ mod write;
 #[cfg(test)]
 mod tests;
 
-pub use lock::{FORMAT, Lock, LockedFile, LockedLevel, LockedSource, LockedTexture, figure, hash};
+pub use lock::{
+    FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure, hash,
+};
 pub use says::says;
 pub use write::{writable, write_atomically};
 

@@ -3,6 +3,7 @@
 //! ```text
 //! path --read--> text --parse--> Module --validate--> ModuleInfo --choose--> Source
 //!        vertex file: text --parse--> Module --link--> Module of both
+//!        with #import: text --compose--> Module --link, demangle--> Module
 //! ```
 //!
 //! Whatever is wrong is said at its place in the user's file.
@@ -12,8 +13,11 @@ mod feed;
 mod files;
 mod glsl;
 pub(crate) mod identifiers;
+#[cfg(feature = "imports")]
+mod imports;
 mod link;
 mod lower;
+mod modules;
 pub(crate) mod names;
 mod parse;
 mod settle;
@@ -22,12 +26,14 @@ mod vertex_stage;
 pub use entry::{Input, Stages, inputs};
 pub use feed::Feed;
 pub use files::{File, OtherFile, Place};
+pub use modules::{Definition, Modules, Value};
 pub use parse::{CAPABILITIES, validate};
 pub use vertex_stage::VertexStage;
 
 use crate::{Diagnostic, Result};
 use naga::valid::ModuleInfo;
 use naga::{EntryPoint, GlobalVariable, Handle, Module, ShaderStage, Span};
+use parse::Language;
 use std::path::{Path, PathBuf};
 
 /// A shader as the user wrote it, parsed and validated, with the entry points that lodc works on.
@@ -66,22 +72,25 @@ impl Source {
         Self::read_stages(path, &Stages::default())
     }
 
-    /// As [`Source::read`], with entry points chosen by name.
+    /// As [`Source::read`], with entry points chosen by name, and the vertex stage from another file.
     ///
     /// # Errors
     /// As [`Source::read`], and when a name is not there.
     pub fn read_stages(path: &Path, stages: &Stages) -> Result<Self> {
-        let name = path.display().to_string();
-        // Before the extension: a folder has none, and that is not what is wrong with it.
-        let text = read_text(path, "shader");
-        parse::expect_known(path, &name, text.is_ok())?;
+        Self::read_with(path, stages, &Modules::default())
+    }
+
+    /// As [`Source::read_stages`], with modules that the files may import.
+    ///
+    /// # Errors
+    /// As [`Source::read_stages`], and when a module is not found or is wrong.
+    pub fn read_with(path: &Path, stages: &Stages, modules: &Modules) -> Result<Self> {
+        let main = Text::read(path, parse::expect_known)?;
         let beside = parse::vertex_beside(path);
-        let mut source = match stages.vertex_file.as_ref().or(beside.as_ref()) {
-            None => Self::parse_stages(&name, text?, stages)?,
-            Some(vertex) => Self::parsed(&name, text?)?.with_vertex(vertex, stages)?,
-        };
-        source.path = Some(path.to_owned());
-        Ok(source)
+        let vertex = stages.vertex_file.as_ref().or(beside.as_ref());
+        let vertex = vertex.map(|path| Text::read(path, parse::expect_vertex));
+        let vertex = vertex.transpose()?;
+        Self::of_texts(main, vertex, stages, modules)
     }
 
     /// Parses a text; `name` is what messages call it, and its extension says what language it is in: WGSL,
@@ -98,68 +107,161 @@ impl Source {
     /// # Errors
     /// As [`Source::parse`], and when a name is not there.
     pub fn parse_stages(name: &str, text: impl Into<String>, stages: &Stages) -> Result<Self> {
-        let mut source = Self::parsed(name, text.into())?;
-        (source.vertex, source.fragment) = entry::choose(&source, stages)?;
-        Ok(source)
-    }
-
-    /// A text with no entry point chosen yet.
-    fn parsed(name: &str, text: String) -> Result<Self> {
-        let language = parse::language(Path::new(name)).unwrap_or_default();
-        let (module, info) = parse::parse(name, &text, language)?;
-        Ok(Self {
+        let main = Text {
             name: name.to_owned(),
             path: None,
-            text,
-            others: Vec::new(),
-            verbatim: language == parse::Language::Wgsl,
-            module,
-            info,
-            vertex: None,
-            fragment: String::new(),
-        })
+            text: text.into(),
+        };
+        Self::of_texts(main, None, stages, &Modules::default())
     }
 
-    /// This source with the vertex stage of another file linked to it.
-    fn with_vertex(mut self, path: &Path, stages: &Stages) -> Result<Self> {
-        let name = path.display().to_string();
-        let text = read_text(path, "shader");
-        parse::expect_vertex(path, &name, text.is_ok())?;
-        let text = text?;
-        let written_in = parse::language(path).unwrap_or_default();
-        let (module, _) = parse::parse(&name, &text, written_in)?;
-        let wanted = stages.vertex.as_deref();
-        let Some(vertex) = entry::pick(&name, &text, &module, ShaderStage::Vertex, wanted)? else {
-            return Err(
-                Diagnostic::error(format!("`{name}` has no vertex entry point"))
-                    .with_note("name the file that has one with `--vertex-file`"),
-            );
+    fn of_texts(
+        main: Text,
+        vertex: Option<Text>,
+        stages: &Stages,
+        modules: &Modules,
+    ) -> Result<Self> {
+        let parsed = main.parse()?;
+        let mut source = Self {
+            verbatim: main.language() == Language::Wgsl,
+            name: main.name,
+            path: main.path,
+            text: main.text,
+            others: Vec::new(),
+            module: Module::default(),
+            info: ModuleInfo::default(),
+            vertex: None,
+            fragment: String::new(),
         };
-        let start = self.end();
-        self.others.push(OtherFile {
-            name,
-            path: Some(path.to_owned()),
-            text,
-            start,
+        let vertex = match vertex {
+            Some(text) => {
+                let parsed = text.parse()?;
+                let start = source.end();
+                source.others.push(OtherFile {
+                    name: text.name,
+                    path: text.path,
+                    text: text.text,
+                    start,
+                });
+                Some(parsed)
+            }
+            None => None,
+        };
+        match (parsed, vertex) {
+            (Some((module, info)), None) => {
+                (source.module, source.info) = (module, info);
+                (source.vertex, source.fragment) = entry::choose(&source, stages)?;
+                Ok(source)
+            }
+            (main, vertex) => source.linked(main, vertex, stages, modules),
+        }
+    }
+
+    /// This source with its module linked of what its files were parsed to; what is `None` within is composed.
+    fn linked(
+        mut self,
+        main: Parsed,
+        vertex: Option<Parsed>,
+        stages: &Stages,
+        modules: &Modules,
+    ) -> Result<Self> {
+        self.verbatim = false;
+        let has_vertex = vertex.is_some();
+        let parsed = std::iter::once(main).chain(vertex);
+        let parsed: Vec<Option<Module>> = parsed.map(|p| Some(p?.0)).collect();
+        let parts = self.parts(parsed, modules)?;
+        let wanted = match parts.get(1) {
+            Some((module, _)) if has_vertex => {
+                let file = &self.others[0];
+                let wanted = stages.vertex.as_deref();
+                let stage = ShaderStage::Vertex;
+                let found = entry::pick(&file.name, &file.text, module, stage, wanted)?;
+                Some(found.ok_or_else(|| {
+                    Diagnostic::error(format!("`{}` has no vertex entry point", file.name))
+                        .with_note("name the file that has one with `--vertex-file`")
+                })?)
+            }
+            _ => None,
+        };
+        let is_wanted =
+            |e: &EntryPoint| e.stage == ShaderStage::Vertex && Some(&e.name) == wanted.as_ref();
+        let linked: Vec<link::Part<'_>> = parts
+            .iter()
+            .enumerate()
+            .map(|(at, (module, place))| link::Part {
+                module,
+                wanted: if at == 0 { &|_| true } else { &is_wanted },
+                place,
+            })
+            .collect();
+        let mut module = link::link(&linked).map_err(|clash| self.clash(&clash))?;
+        #[cfg(feature = "imports")]
+        imports::demangle(&mut module);
+        self.info = validate(&module).map_err(|error| parse::invalid(&self, &error))?;
+        self.module = module;
+        let mut stages = stages.clone();
+        if has_vertex {
+            // The linked one comes last, whatever it is called by now.
+            stages.vertex = self.module.entry_points.last().map(|e| e.name.clone());
+        }
+        (self.vertex, self.fragment) = entry::choose(&self, &stages)?;
+        Ok(self)
+    }
+
+    /// The modules of this source's files, each with where its spans lie.
+    fn parts(&mut self, parsed: Vec<Option<Module>>, modules: &Modules) -> Result<Vec<Part>> {
+        #[cfg(feature = "imports")]
+        let mut composed = self.composed(&parsed, modules)?.into_iter();
+        #[cfg(not(feature = "imports"))]
+        let _ = modules;
+        let starts: Vec<usize> = self.files().map(|file| file.start).collect();
+        let parts = parsed.into_iter().zip(starts).map(|(module, start)| {
+            if let Some(module) = module {
+                let place = move |span: Span| match span.to_range() {
+                    Some(range) => Span::from(range.start + start..range.end + start),
+                    None => span,
+                };
+                return Some((module, Box::new(place) as Box<dyn Fn(Span) -> Span>));
+            }
+            #[cfg(feature = "imports")]
+            {
+                let composed = composed.next()?;
+                let (module, spans) = (composed.module, composed.spans);
+                Some((module, Box::new(move |span| spans.place(span)) as _))
+            }
+            #[cfg(not(feature = "imports"))]
+            None
         });
-        let behind = |span: Span| match span.to_range() {
-            Some(range) => Span::from(range.start + start..range.end + start),
-            None => span,
+        Ok(parts.flatten().collect())
+    }
+
+    /// Composes those of this source's files that naga did not parse as they are.
+    #[cfg(feature = "imports")]
+    fn composed(
+        &mut self,
+        parsed: &[Option<Module>],
+        modules: &Modules,
+    ) -> Result<Vec<imports::Composed>> {
+        let paths = std::iter::once(self.path.as_deref())
+            .chain(self.others.iter().map(|other| other.path.as_deref()));
+        let mains: Vec<imports::Main<'_>> = self
+            .files()
+            .zip(paths)
+            .zip(parsed)
+            .filter(|(_, module)| module.is_none())
+            .map(|((file, path), _)| imports::Main {
+                name: file.name,
+                path,
+                text: file.text,
+                start: file.start,
+            })
+            .collect();
+        let (composed, files) = match mains.is_empty() {
+            true => return Ok(Vec::new()),
+            false => imports::compose(&mains, modules, self.end())?,
         };
-        let linked = link::link(&[
-            link::Part {
-                module: &self.module,
-                wanted: &|_| true,
-                place: &|span| span,
-            },
-            link::Part {
-                module: &module,
-                wanted: &|e| e.stage == ShaderStage::Vertex && e.name == vertex,
-                place: &behind,
-            },
-        ]);
-        let module = linked.map_err(|clash| self.clash(&clash))?;
-        self.with_module(module, stages)
+        self.others.extend(files);
+        Ok(composed)
     }
 
     /// What two files declare differently, at the second one's place.
@@ -178,30 +280,6 @@ impl Source {
             None => error,
         };
         error.with_note("the stages are drawn together: declare it alike in both files")
-    }
-
-    /// This source with a module that was linked of several, whose vertex entry point is the last one.
-    fn with_module(mut self, module: Module, stages: &Stages) -> Result<Self> {
-        self.info = validate(&module).map_err(|error| {
-            let spans: Vec<_> = error.spans().cloned().collect();
-            let message = format!("the stages do not fit together: {}", error.as_inner());
-            spans
-                .iter()
-                .fold(Diagnostic::error(message), |d, (span, _)| {
-                    self.locate(d, *span, "here")
-                })
-        })?;
-        self.module = module;
-        self.verbatim = false;
-        let last = self.module.entry_points.last();
-        let vertex = last.filter(|e| e.stage == ShaderStage::Vertex);
-        let chosen = Stages {
-            vertex: vertex.map(|e| e.name.clone()),
-            fragment: stages.fragment.clone(),
-            vertex_file: None,
-        };
-        (self.vertex, self.fragment) = entry::choose(&self, &chosen)?;
-        Ok(self)
     }
 
     /// The place of the fragment entry point in the module, and the entry point.
@@ -267,6 +345,53 @@ impl Source {
         diagnostic
             .with_source(place.file.name, place.file.text)
             .with_label(place.range, remark)
+    }
+}
+
+/// A module, and where its spans lie in a source.
+type Part = (Module, Box<dyn Fn(Span) -> Span>);
+
+/// A parsed text; `None` when it has to be composed.
+type Parsed = Option<(Module, ModuleInfo)>;
+
+/// A text of a shader.
+struct Text {
+    name: String,
+    path: Option<PathBuf>,
+    text: String,
+}
+
+impl Text {
+    /// Reads a file of a shader; `expect` refuses those that are none by their names.
+    fn read(path: &Path, expect: fn(&Path, &str, bool) -> Result<()>) -> Result<Self> {
+        let name = path.display().to_string();
+        // Before the extension: a folder has none, and that is not what is wrong with it.
+        let text = read_text(path, "shader");
+        expect(path, &name, text.is_ok())?;
+        Ok(Self {
+            name,
+            path: Some(path.to_owned()),
+            text: text?,
+        })
+    }
+
+    fn language(&self) -> Language {
+        parse::language(Path::new(&self.name)).unwrap_or_default()
+    }
+
+    fn parse(&self) -> Result<Parsed> {
+        match parse::parse(&self.name, &self.text, self.language()) {
+            Ok(parsed) => Ok(Some(parsed)),
+            // A directive in a comment is none: only what naga refuses is composed.
+            Err(_)
+                if cfg!(feature = "imports")
+                    && self.language() == Language::Wgsl
+                    && modules::directive(&self.text).is_some() =>
+            {
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! A text to a validated module, with naga's errors as diagnostics in the user's file.
 
+use super::Source;
 use super::names::whole_word;
 use super::{glsl, settle};
 use crate::{Diagnostic, Result};
@@ -145,11 +146,19 @@ pub(super) fn parse(name: &str, text: &str, language: Language) -> Result<(Modul
             text.len()
         )));
     }
-    // A thread of its own gives naga its stack, and turns a panic of naga into an error here.
+    on_deep_stack(name, || parse_here(name, text, language))
+}
+
+/// Runs what calls naga's reader on a thread of its own, which gives naga its stack, and turns a panic of naga
+/// into an error here.
+pub(super) fn on_deep_stack<T: Send>(
+    name: &str,
+    run: impl FnOnce() -> Result<T> + Send,
+) -> Result<T> {
     std::thread::scope(|scope| {
         std::thread::Builder::new()
             .stack_size(STACK)
-            .spawn_scoped(scope, || parse_here(name, text, language))
+            .spawn_scoped(scope, run)
             .map_err(|error| Diagnostic::error(format!("cannot start a thread: {error}")))?
             .join()
             .unwrap_or_else(|_| {
@@ -188,43 +197,71 @@ fn wgsl(name: &str, text: &str) -> Result<Module> {
 /// Validates a module that was parsed from a text.
 fn checked(name: &str, text: &str, module: &Module) -> Result<ModuleInfo> {
     // Here, where the stack is deep enough even to drop what is too deep for everyone else.
-    let functions = module.functions.iter().map(|(_, f)| f);
-    let entries = module.entry_points.iter().map(|e| &e.function);
-    for function in functions.chain(entries) {
-        if let Some(place) = too_deep(&function.body, DEEPEST) {
-            let error =
-                Diagnostic::error(format!("statements are nested more than {DEEPEST} deep"))
-                    .with_source(name, text);
-            return Err(at(error, place, "too deep from here")
-                .with_note("split the function, or turn a chain of `else if` into a `switch`"));
-        }
+    if let Some(place) = nested(module) {
+        let error = nested_error().with_source(name, text);
+        return Err(at(error, place, "too deep from here"));
     }
     validate(module).map_err(|error| {
-        // The outermost says which function, the innermost what is wrong.
-        let mut reasons = Vec::new();
-        let mut next: Option<&dyn Error> = error.as_inner().source();
-        while let Some(reason) = next {
-            reasons.push(reason.to_string());
-            next = reason.source();
+        let place = |d: Box<Diagnostic>, span, remark: &str| at(d, span, remark);
+        let located = |d: Box<Diagnostic>| d.with_source(name, text);
+        let error = invalid_at(&error, &located, &place);
+        match error.1.filter(|_| error.0.labels.is_empty()) {
+            Some(subject) => match whole_word(text, 0..text.len(), &subject) {
+                Some(place) => error.0.with_label(place, "in this"),
+                None => error.0,
+            },
+            None => error.0,
         }
-        let message = uncapitalised(&error.as_inner().to_string());
-        let located = Diagnostic::error(message).with_source(name, text);
-        let labelled = error
-            .spans()
-            .fold(located, |d, (span, remark)| at(d, *span, readable(remark)));
-        let labelled = match subject(error.as_inner()) {
-            Some(subject) if labelled.labels.is_empty() => {
-                match whole_word(text, 0..text.len(), subject) {
-                    Some(place) => labelled.with_label(place, "in this"),
-                    None => labelled,
-                }
-            }
-            _ => labelled,
-        };
-        reasons
-            .iter()
-            .fold(labelled, |d, reason| d.with_reason(uncapitalised(reason)))
     })
+}
+
+/// What naga's validator refuses in a source of several files.
+pub(super) fn invalid(source: &Source, error: &WithSpan<ValidationError>) -> Box<Diagnostic> {
+    let place = |d: Box<Diagnostic>, span, remark: &str| source.locate(d, span, remark);
+    let (diagnostic, _) = invalid_at(error, &|d| d, &place);
+    match diagnostic.source {
+        Some(_) => diagnostic,
+        None => diagnostic.with_source(&source.name, &source.text),
+    }
+}
+
+/// What naga's validator refuses, and the name of what it is about.
+fn invalid_at(
+    error: &WithSpan<ValidationError>,
+    located: &dyn Fn(Box<Diagnostic>) -> Box<Diagnostic>,
+    place: &dyn Fn(Box<Diagnostic>, Span, &str) -> Box<Diagnostic>,
+) -> (Box<Diagnostic>, Option<String>) {
+    // The outermost says which function, the innermost what is wrong.
+    let mut reasons = Vec::new();
+    let mut next: Option<&dyn Error> = error.as_inner().source();
+    while let Some(reason) = next {
+        reasons.push(reason.to_string());
+        next = reason.source();
+    }
+    let message = uncapitalised(&error.as_inner().to_string());
+    let labelled = error
+        .spans()
+        .fold(located(Diagnostic::error(message)), |d, (span, remark)| {
+            place(d, *span, readable(remark))
+        });
+    let explained = reasons
+        .iter()
+        .fold(labelled, |d, reason| d.with_reason(uncapitalised(reason)));
+    (explained, subject(error.as_inner()).map(str::to_owned))
+}
+
+/// Where statements of a module are nested too deep for what is behind the reader.
+pub(super) fn nested(module: &Module) -> Option<Span> {
+    let functions = module.functions.iter().map(|(_, f)| f);
+    let entries = module.entry_points.iter().map(|e| &e.function);
+    let mut all = functions.chain(entries);
+    all.find_map(|function| too_deep(&function.body, DEEPEST))
+}
+
+/// What is said of that.
+pub(super) fn nested_error() -> Box<Diagnostic> {
+    Diagnostic::error(format!("statements are nested more than {DEEPEST} deep"))
+        .with_note("split the function, or turn a chain of `else if` into a `switch`")
 }
 
 /// Where statements are nested deeper than `left` more blocks.
@@ -265,9 +302,7 @@ fn foreign_directive(name: &str, text: &str) -> Option<Box<Diagnostic>> {
                 Diagnostic::error(format!("{what} not read by this build"))
                     .with_source(name, text)
                     .with_label(place, "not WGSL")
-                    .with_note(
-                        "compose the module first, with `naga_oil`, and give lodc the plain WGSL",
-                    ),
+                    .with_note("build lodc with `--features imports`, which composes modules"),
             );
         }
         if directive == "import" && words.ends_with(';') {

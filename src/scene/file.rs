@@ -26,6 +26,10 @@ pub(super) struct SceneFile {
     pub(super) exposure: Option<Spanned<f64>>,
     pub(super) tone_mapping: Option<Spanned<String>>,
     #[serde(default)]
+    pub(super) shader: Shader,
+    #[serde(default)]
+    pub(super) modules: Modules,
+    #[serde(default)]
     pub(super) distance: Distance,
     #[serde(default)]
     pub(super) views: Views,
@@ -39,6 +43,23 @@ pub(super) struct SceneFile {
     pub(super) samplers: Entries,
     #[serde(default)]
     pub(super) attributes: Entries,
+}
+
+/// `[shader]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Shader {
+    pub(super) vertex: Option<Spanned<String>>,
+}
+
+/// `[modules]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Modules {
+    #[serde(default)]
+    pub(super) folders: Vec<String>,
+    #[serde(default)]
+    pub(super) definitions: Entries,
 }
 
 /// `[distance]`.
@@ -215,6 +236,8 @@ impl Toml<'_> {
                 ("sequence", "list"),
                 ("integer `", "number `"),
                 ("floating point `", "number `"),
+                ("struct Shader", "a table"),
+                ("struct Modules", "a table"),
                 ("struct Distance", "a table"),
                 ("struct Views", "a table"),
             ];

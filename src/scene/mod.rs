@@ -16,11 +16,13 @@ pub mod mesh;
 pub mod objects;
 mod semantic;
 mod settings;
+mod shader;
 mod textures;
 
 pub use buffers::{Uniform, Variation};
 pub use semantic::Semantic;
 pub use settings::{Output, ToneMapping};
+pub use shader::Reading;
 pub use textures::SceneTexture;
 
 use crate::eval::machine::{Bindings, Resource};

@@ -1,0 +1,2 @@
+#import lib::{lights
+@fragment fn fs() -> @location(0) vec4f { return vec4f(1.0); }

@@ -1,0 +1,2 @@
+#import lib::lights::{Light, lambert}
+@fragment fn fs() -> @location(0) vec4f { return vec4f(lambert(vec3f(1.0)), 1.0); }

@@ -1,0 +1,2 @@
+#define_import_path lib::twice
+fn twice(x: f32) -> f32 { return 2.0 * x; }
