@@ -242,9 +242,19 @@ pub(super) fn resolve(
                 .extend(element.map(|leaf| missing(source, handle, leaf, table)));
         }
         for leaf in layout.leaves(&root, runtime) {
-            let mut found = own().filter_map(|g| g.fills.iter().find(|(l, _)| l.path == leaf.path));
-            if let Some((_, fill)) = found.next() {
-                parts.push((leaf, fill.clone()));
+            let given = |is_rest: bool| {
+                // Of several that fill what is left, the one that says most about where.
+                let own = own().filter(|g| g.is_rest == is_rest);
+                let fills = own.filter_map(|g| {
+                    let (_, fill) = g.fills.iter().find(|(l, _)| l.path == leaf.path)?;
+                    Some((g.place.path.len(), fill.clone()))
+                });
+                fills
+                    .max_by_key(|(length, _)| *length)
+                    .map(|(_, fill)| fill)
+            };
+            if let Some(fill) = given(false) {
+                parts.push((leaf, fill));
                 continue;
             }
             if !used.uses(&leaf.path) || is_padding(&leaf) {
@@ -277,7 +287,10 @@ pub(super) fn resolve(
                         .push(Inference::new(table, &leaf.path, &value));
                     parts.push((leaf, fill));
                 }
-                None => said.missing.push(missing(source, handle, &leaf, table)),
+                None => match given(true) {
+                    Some(fill) => parts.push((leaf, fill)),
+                    None => said.missing.push(missing(source, handle, &leaf, table)),
+                },
             }
         }
         buffers.push(Buffer {
@@ -384,7 +397,9 @@ pub(super) fn missing_error(source: &Source, file: &str, missing: &[Missing]) ->
             );
         }
     }
-    let mut lines = format!("their names do not say it; put values into {file}:");
+    let mut lines = format!(
+        "their names do not say it; put values into {file} (\"zero\" gives a whole struct or array zeros):"
+    );
     if missing.len() == 1 {
         lines = format!("its name does not say it; put a value into {file}:");
     }
@@ -467,6 +482,42 @@ mod tests {
             .chunks(4)
             .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
             .collect()
+    }
+
+    #[test]
+    fn zero_fills_what_nothing_else_says() {
+        let toml = "
+            [uniforms]
+            s = \"zero\"
+            \"s.gloss\" = 0.5
+            \"s.lamps[1].power\" = 4
+            wet = \"zero\"
+            [storage]
+            items = \"zero\"";
+        let file: SceneFile = toml::from_str(toml).unwrap();
+        let named = Toml {
+            name: "a.toml",
+            text: toml,
+        };
+        let mut said = Said::default();
+        let resolved = resolve(&source(), named, &file.uniforms, &file.storage, &mut said);
+        let buffers = resolved.unwrap_or_else(|error| panic!("{error}"));
+        assert!(said.missing.is_empty());
+        let fill = |path: &str| {
+            let mut parts = buffers.iter().flat_map(|b| &b.parts);
+            parts
+                .find(|(leaf, _)| leaf.path == path)
+                .map(|(_, fill)| fill.clone())
+        };
+        assert_eq!(
+            fill("s.view_proj"),
+            Some(Fill::Semantic(Semantic::ViewProjection))
+        );
+        assert_eq!(fill("s.gloss"), Some(Fill::Fixed(vec![0.5])));
+        assert_eq!(fill("s.mode"), Some(Fill::Fixed(vec![0.0])));
+        assert_eq!(fill("s.turn"), Some(Fill::Fixed(vec![0.0; 9])));
+        assert_eq!(fill("s.lamps[1].power"), Some(Fill::Fixed(vec![4.0])));
+        assert_eq!(fill("items[0].power"), Some(Fill::Fixed(vec![0.0])));
     }
 
     #[test]

@@ -16,7 +16,12 @@ pub(super) struct Given<'f> {
     pub(super) place: Place,
     /// For each leaf of the place, in order.
     pub(super) fills: Vec<(Leaf, Fill)>,
+    /// Whether it gives only what no other entry gives and no name tells.
+    pub(super) is_rest: bool,
 }
+
+/// What fills a whole part of a buffer that nothing else says anything of.
+const ZERO: &str = "zero";
 
 /// Reads one entry of `[uniforms]` or `[storage]`.
 pub(super) fn read_entry<'f>(
@@ -30,19 +35,33 @@ pub(super) fn read_entry<'f>(
 ) -> Result<Given<'f>> {
     let mut place = find(source, layout, toml, table, key)?;
     let path = place.path.clone();
-    if let Some(other) = before
-        .iter()
-        .find(|g| is_in(&g.place.path, &path) || is_in(&path, &g.place.path))
-    {
+    let is_rest = matches!(value.get_ref(), Node::Text(text) if text == ZERO);
+    let twice = |g: &&Given| {
+        let overlap = is_in(&g.place.path, &path) || is_in(&path, &g.place.path);
+        g.place.path == path || (overlap && !g.is_rest && !is_rest)
+    };
+    if let Some(other) = before.iter().find(twice) {
         return Err(toml
             .error(format!("`{path}` is given twice"), key.span(), "again here")
             .with_label(other.key.span(), "first here"));
     }
     let read = Reader { layout, toml };
     let fills = match value.get_ref() {
+        Node::Text(_) if is_rest => {
+            if layout.has_runtime_array(place.ty) {
+                place.runtime = place.runtime.max(1);
+            }
+            let leaves = layout.leaves(&place, place.runtime.max(1)).into_iter();
+            leaves
+                .map(|leaf| {
+                    let zeros = vec![0.0; leaf.len()];
+                    (leaf, Fill::Fixed(zeros))
+                })
+                .collect()
+        }
         Node::Text(keyword) => {
             let semantic = Semantic::of_keyword(keyword).ok_or_else(|| {
-                let known: Vec<&str> = Semantic::keywords().collect();
+                let known: Vec<&str> = Semantic::keywords().chain([ZERO]).collect();
                 let error =
                     toml.error(format!("there is no meaning `{keyword}`"), value.span(), "");
                 suggest(error, keyword, &known)
@@ -70,7 +89,12 @@ pub(super) fn read_entry<'f>(
             .map(|(leaf, numbers)| (leaf, Fill::Fixed(numbers)))
             .collect(),
     };
-    Ok(Given { key, place, fills })
+    Ok(Given {
+        key,
+        place,
+        fills,
+        is_rest,
+    })
 }
 
 /// The part of a buffer that a key names.
