@@ -209,6 +209,21 @@ fn emitted_levels_have_the_errors_that_are_reported() {
                 level.autolod,
                 level.error.rmse
             );
+            // What is reported holds on pictures that the search has not seen, but for chance.
+            let (held_out, chance) = (
+                level.error.held_out_rmse.expect("a level has a test split"),
+                level
+                    .error
+                    .held_out_standard_error
+                    .expect("it has several pictures"),
+            );
+            assert!(
+                held_out <= level.error.rmse + 2.0 * chance,
+                "{}: level at {}: reported {}, held out {held_out} +- {chance}",
+                source.name,
+                level.autolod,
+                level.error.rmse
+            );
         }
     }
 }

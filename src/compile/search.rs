@@ -196,6 +196,7 @@ impl Ready {
         Origin {
             command: request.command.clone(),
             seed: self.scene.seed,
+            pixels_per_degree: self.scene.pixels_per_degree,
             inputs: self
                 .scene
                 .inputs

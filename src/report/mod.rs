@@ -25,13 +25,15 @@ pub struct Report {
     pub inputs: Vec<Input>,
     /// Pixels per object unit where autoLOD is 0.
     pub rho0: f64,
+    /// Pixels per degree of what is looked at, for FLIP.
+    pub pixels_per_degree: f64,
     /// How many variants were measured.
     pub variants: u64,
     /// Level 0, the original, first.
     pub levels: Vec<LevelReport>,
     /// Every variant that nothing beat in error and cost, distance by distance.
     pub frontier: Vec<FrontierReport>,
-    /// What the scene does not need, and so was left out.
+    /// What was left out, and why.
     pub left_out: Vec<String>,
     /// What should be known about this result.
     pub warnings: Vec<String>,
@@ -86,10 +88,22 @@ pub struct ErrorReport {
     pub max: f64,
     /// Peak signal-to-noise ratio, decibels; null when there is no difference.
     pub psnr: Option<f64>,
-    /// FLIP; not measured yet.
-    pub flip: Option<f64>,
-    /// RMSE on samples that decided nothing; not measured yet.
+    /// FLIP, the mean over the covered pixels, 0..1.
+    pub flip: f64,
+    /// RMSE on pictures that decided nothing: other views, uniforms and offsets of the same ranges.
     pub held_out_rmse: Option<f64>,
+    /// The standard error of `held_out_rmse`.
+    pub held_out_standard_error: Option<f64>,
+    /// What the level adds to the original's own error on the same pictures.
+    pub held_out_excess: Option<f64>,
+    /// The largest excess of one view.
+    pub worst_view: f64,
+    /// The largest excess of a tile of 8 x 8 pixels of one picture.
+    pub worst_tile: f64,
+    /// Standard deviation of a pixel from offset to offset.
+    pub shimmer: f64,
+    /// That of the original.
+    pub shimmer_floor: f64,
     /// Error of the transition into the level; not measured yet.
     pub transition: Option<f64>,
 }
@@ -185,6 +199,8 @@ pub struct Origin {
     pub command: String,
     /// The seed.
     pub seed: u64,
+    /// Pixels per degree of what is looked at.
+    pub pixels_per_degree: f64,
     /// What was read.
     pub inputs: Vec<Input>,
     /// Triangles of the scene's mesh.
@@ -212,10 +228,11 @@ impl Report {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             rho0: found.rho0,
+            pixels_per_degree: origin.pixels_per_degree,
             variants: found.variants,
             levels: found.levels.iter().zip(says).map(level).collect(),
             frontier: found.distances.iter().flat_map(frontier).collect(),
-            left_out: Vec::new(),
+            left_out: found.distances.iter().filter_map(withdrawn).collect(),
             command: origin.command,
             seed: origin.seed,
             inputs: origin.inputs,
@@ -252,8 +269,14 @@ fn level_report(
             bound: error.bound,
             max: error.max,
             psnr: Some(error.psnr()).filter(|psnr| psnr.is_finite()),
-            flip: None,
-            held_out_rmse: None,
+            flip: level.flip,
+            held_out_rmse: level.held_out.map(|held_out| held_out.rmse),
+            held_out_standard_error: level.held_out.and_then(|held_out| held_out.standard_error),
+            held_out_excess: level.held_out.map(|held_out| held_out.excess),
+            worst_view: error.worst_view,
+            worst_tile: error.worst_tile,
+            shimmer: error.shimmer,
+            shimmer_floor: error.shimmer_floor,
             transition: None,
         },
         time: TimeReport {
@@ -295,6 +318,20 @@ fn level_report(
             .collect(),
         stability: StabilityReport::default(),
     }
+}
+
+/// What the validation split has withdrawn at a distance.
+fn withdrawn(at: &AtDistance) -> Option<String> {
+    let what = match at.withdrawn {
+        0 => return None,
+        1 => "a variant".to_owned(),
+        several => format!("{several} variants"),
+    };
+    Some(format!(
+        "at distance {:.2}, {what} within the bound on the scene's samples, and over it on pictures that the search \
+         had not seen",
+        at.distance
+    ))
 }
 
 fn frontier(at: &AtDistance) -> impl Iterator<Item = FrontierReport> + '_ {

@@ -2,6 +2,7 @@
 //!
 //! All of it is f64 arithmetic without platform functions, so that matrices have the same bits everywhere.
 
+use super::chance::{child, unit};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// A sphere around an object, world units.
@@ -117,23 +118,59 @@ pub(crate) fn spread(count: usize, axis: DVec3, angle: f64) -> Vec<DVec3> {
     if count == 1 {
         return vec![axis];
     }
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..count)
+        .map(|i| {
+            let share = (i as f64 + 0.5) / count as f64;
+            on_cap(axis, angle, share, golden * i as f64)
+        })
+        .collect()
+}
+
+/// How far a listed direction is turned, at most, for a view that decides nothing, in radians: 11 degrees.
+pub const TURN: f64 = 0.2;
+
+/// Where views come from that the scene does not list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Around {
+    /// From a cap of the sphere: its axis, and its angle in radians.
+    Cap(DVec3, f64),
+    /// From around the directions that are listed.
+    Listed,
+}
+
+impl Around {
+    /// A direction by chance.
+    pub(super) fn view(self, listed: &[DVec3], seed: u64) -> DVec3 {
+        match self {
+            Self::Cap(axis, angle) => within(axis, angle, seed),
+            Self::Listed => {
+                let one = (unit(child(seed, 0)) * listed.len() as f64) as usize;
+                let direction = listed.get(one).copied().unwrap_or(DVec3::Z);
+                within(direction, TURN, child(seed, 1))
+            }
+        }
+    }
+}
+
+/// A direction by chance, every one within `angle` (radians) of `axis` as likely as another.
+pub(super) fn within(axis: DVec3, angle: f64, seed: u64) -> DVec3 {
+    let share = unit(child(seed, 0));
+    let turn = std::f64::consts::TAU * unit(child(seed, 1));
+    on_cap(axis, angle, share, turn)
+}
+
+/// The direction that has the given share of a cap's area within it, turned about its axis.
+fn on_cap(axis: DVec3, angle: f64, share: f64, turn: f64) -> DVec3 {
     let side = match axis.y.abs() > 0.9 {
         true => DVec3::Z,
         false => DVec3::Y,
     };
     let u = side.cross(axis).normalize();
     let v = axis.cross(u);
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..count)
-        .map(|i| {
-            let share = (i as f64 + 0.5) / count as f64;
-            let along = 1.0 - share * (1.0 - libm::cos(angle));
-            let across = (1.0 - along * along).max(0.0).sqrt();
-            let turn = golden * i as f64;
-            (axis * along + u * (across * libm::cos(turn)) + v * (across * libm::sin(turn)))
-                .normalize()
-        })
-        .collect()
+    let along = 1.0 - share * (1.0 - libm::cos(angle));
+    let across = (1.0 - along * along).max(0.0).sqrt();
+    (axis * along + u * (across * libm::cos(turn)) + v * (across * libm::sin(turn))).normalize()
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub(super) struct SceneFile {
     pub(super) q: Option<Spanned<f64>>,
     pub(super) levels: Option<Spanned<i64>>,
     pub(super) offsets: Option<Spanned<i64>>,
+    pub(super) pixels_per_degree: Option<Spanned<f64>>,
     pub(super) output: Option<Spanned<String>>,
     pub(super) exposure: Option<Spanned<f64>>,
     pub(super) tone_mapping: Option<Spanned<String>>,

@@ -10,6 +10,7 @@
 mod attributes;
 mod buffers;
 pub mod camera;
+pub(crate) mod chance;
 mod file;
 mod layout;
 pub mod mesh;
@@ -29,8 +30,10 @@ use crate::eval::machine::{Bindings, Resource};
 use crate::eval::raster::{Attribute, Frame};
 use crate::front::{Source, VertexStage, inputs, read_text};
 use crate::{Diagnostic, Result};
+use buffers::Draw;
 use buffers::{Buffer, Said};
-use camera::{Pose, Sphere};
+use camera::{Around, Pose, Sphere};
+use chance::{child, unit};
 use file::Toml;
 use glam::{DMat4, DVec3};
 use lodc_passes::autolod;
@@ -73,10 +76,14 @@ pub struct Scene {
     pub farthest: f64,
     /// How many offsets within a pixel errors are measured at.
     pub offsets: usize,
+    /// How many pixels a degree has for whoever looks at a picture, for FLIP.
+    pub pixels_per_degree: f64,
     /// What the shader returns.
     pub output: Output,
     /// Unit vectors from the sphere's centre to the eye.
     pub views: Vec<DVec3>,
+    /// Where views come from that decide nothing.
+    around: Around,
     /// Every scalar, vector and matrix in the shader's buffers that has a value, in the order of declaration.
     pub uniforms: Vec<Uniform>,
     /// The shader's textures.
@@ -104,6 +111,18 @@ pub struct InputFile {
     /// `blake3:` and 64 hexadecimal digits, over its bytes.
     pub hash: String,
 }
+
+/// Pictures that decide nothing while levels are searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// They may withdraw a level.
+    Validation = 1,
+    /// They are reported, and nothing else.
+    Test = 2,
+}
+
+/// The most pictures at one distance: what a search can look at, in memory that does not grow with the scene.
+pub const MOST_FRAMES: usize = 256;
 
 /// Something that was left out of the scene, and told from a name and a type.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -254,8 +273,10 @@ impl Scene {
             nearest: settings.nearest,
             farthest: settings.farthest,
             offsets: settings.offsets,
+            pixels_per_degree: settings.pixels_per_degree,
             output: settings.output,
             views: settings.views,
+            around: settings.around,
             uniforms,
             textures: images.textures,
             vertex_stage: fed.stage,
@@ -267,6 +288,17 @@ impl Scene {
             constant: Bindings::new(),
             buffers,
         };
+        if scene.uniform_samples() < scene.samples {
+            scene.warnings.push(*Diagnostic::warning(format!(
+                "the uniforms have {} samples, of which {} are drawn, evenly spaced",
+                scene.samples,
+                scene.uniform_samples()
+            ))
+            .with_note(format!(
+                "errors are measured over at most {MOST_FRAMES} pictures at each distance, and there are {} views",
+                scene.views.len()
+            )));
+        }
         let pose = scene.pose(DVec3::Z, scene.nearest);
         for texture in &scene.textures {
             let resource = Resource::Texture(texture.texture.clone());
@@ -281,7 +313,7 @@ impl Scene {
                 .insert((sampler.group, sampler.binding), resource);
         }
         for buffer in scene.buffers.iter().filter(|b| b.is_constant()) {
-            let resource = buffer.resource(&pose, &scene.sphere, 0);
+            let resource = buffer.resource(&pose, &scene.sphere, Draw::Listed(0));
             scene.constant.insert(buffer.slot(), resource);
         }
         Ok(scene)
@@ -291,17 +323,44 @@ impl Scene {
     /// sample of the uniforms. They are drawn at pixel centres, one sample a pixel; the caller may change
     /// `offset` and `grid`.
     pub fn frames(&self, distance: f64) -> Vec<Frame> {
+        let drawn = self.uniform_samples();
         self.views
             .iter()
-            .flat_map(|view| (0..self.samples).map(|sample| self.frame(*view, distance, sample)))
+            .flat_map(|view| {
+                (0..drawn).map(move |i| {
+                    let sample = i * self.samples / drawn;
+                    self.frame(*view, distance, Draw::Listed(sample))
+                })
+            })
             .collect()
     }
 
-    fn frame(&self, direction: DVec3, distance: f64, sample: usize) -> Frame {
+    /// Pictures at a distance that the search does not see, `count` of them, independent of each other: each has a
+    /// view of its own and uniforms of its own, from the same ranges as the scene's, by chance; each is drawn at an
+    /// offset of its own. The same always for a seed and a split.
+    ///
+    /// Where the scene spreads its views over a part of the sphere, a view is any direction of that part; where it
+    /// lists directions, one of them, turned by up to [`camera::TURN`] radians. A uniform with a range takes
+    /// any value of it; one with a list takes one of the list, the same place in all lists; a light's direction is
+    /// one of the scene's, turned likewise; the time is any of its range.
+    pub fn held_out(&self, distance: f64, split: Split, count: usize) -> Vec<Frame> {
+        let seed = child(self.seed, split as u64);
+        (0..count as u64)
+            .map(|i| {
+                let seed = child(seed, i);
+                let view = self.around.view(&self.views, child(seed, 0));
+                let mut frame = self.frame(view, distance, Draw::Chance(child(seed, 1)));
+                frame.offset = [2, 3].map(|i| (unit(child(seed, i)) - 0.5) as f32);
+                frame
+            })
+            .collect()
+    }
+
+    fn frame(&self, direction: DVec3, distance: f64, draw: Draw) -> Frame {
         let pose = self.pose(direction, distance);
         let mut bindings = self.constant.clone();
         for buffer in self.buffers.iter().filter(|b| !b.is_constant()) {
-            let resource = buffer.resource(&pose, &self.sphere, sample);
+            let resource = buffer.resource(&pose, &self.sphere, draw);
             bindings.insert(buffer.slot(), resource);
         }
         Frame {
@@ -326,10 +385,11 @@ impl Scene {
         )
     }
 
-    /// How many samples of the uniforms there are: each sampled uniform takes its i-th value in the i-th,
-    /// and comes round.
+    /// How many samples of the uniforms are drawn for each view: each sampled uniform takes its i-th value in the i-th,
+    /// and comes round. Of more than [`MOST_FRAMES`] pictures in all, evenly spaced ones.
     pub fn uniform_samples(&self) -> usize {
         self.samples
+            .min((MOST_FRAMES / self.views.len().max(1)).max(1))
     }
 
     /// What autoLOD is computed from at a distance.
@@ -383,6 +443,7 @@ fn hash(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     const TEXT: &str = "
         struct Camera { view_proj: mat4x4f, eye: vec3f, time: f32 }
@@ -446,6 +507,82 @@ mod tests {
         assert_eq!(a[..76], b[..76]);
         assert_ne!(a[76..], b[76..]);
         assert_ne!(a[..64], c[..64]);
+    }
+
+    #[test]
+    fn pictures_that_decide_nothing_are_others_from_the_same_ranges() {
+        let toml = TOML.replace(
+            "tint = [1, 1, 1, 1]",
+            "tint = { from = [0, 0, 0, 1], to = [1, 1, 1, 1], count = 2 }",
+        );
+        let scene = scene(TEXT, &toml).unwrap();
+        let number = |frame: &Frame, slot, at: usize| {
+            let bytes = bytes(frame, slot);
+            f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        };
+        let test = scene.held_out(5.0, Split::Test, 8);
+        let again = scene.held_out(5.0, Split::Test, 8);
+        let other = scene.held_out(5.0, Split::Validation, 8);
+        for (i, frame) in test.iter().enumerate() {
+            let (tint, time) = (number(frame, (0, 1), 0), number(frame, (0, 0), 76));
+            assert!((0.0..=1.0).contains(&tint) && (0.0..=12.3).contains(&time));
+            assert!(frame.offset.iter().all(|o| (-0.5..=0.5).contains(o)));
+            // The eye is at the distance that was asked for.
+            let eye = [64, 68, 72].map(|at| number(frame, (0, 0), at));
+            assert!((Vec3::from(eye).length() - 5.0).abs() < 1e-4, "{eye:?}");
+            assert_eq!(bytes(frame, (0, 0)), bytes(&again[i], (0, 0)));
+            assert_eq!(frame.offset, again[i].offset);
+            for unlike in test[..i].iter().chain(&other).chain(&scene.frames(5.0)) {
+                assert_ne!(bytes(frame, (0, 0)), bytes(unlike, (0, 0)));
+                assert_ne!(tint, number(unlike, (0, 1), 0));
+            }
+        }
+    }
+
+    #[test]
+    fn listed_values_stay_together_and_listed_views_are_turned_a_little() {
+        let toml = "[uniforms]
+            tint = { samples = [[1, 0, 0, 1], [0, 1, 0, 1]] }
+            \"camera.time\" = { samples = [10, 20] }
+            [textures]
+            picture = \"dynamic\"
+            [views]
+            directions = [[0, 0, 1], [0, 1, 0]]";
+        let scene = scene(TEXT, toml).unwrap();
+        let number = |bytes: &[u8], at: usize| {
+            f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        };
+        let mut seen = [0; 2];
+        for frame in scene.held_out(5.0, Split::Test, 16) {
+            let (camera, tint) = (bytes(&frame, (0, 0)), bytes(&frame, (0, 1)));
+            let second = number(tint, 0) == 0.0;
+            assert_eq!(number(camera, 76), if second { 20.0 } else { 10.0 });
+            seen[usize::from(second)] += 1;
+            let eye = [64, 68, 72].map(|at| f64::from(number(camera, at)));
+            let near = scene
+                .views
+                .iter()
+                .map(|view| view.dot(DVec3::from(eye) / 5.0));
+            let angle = near.fold(-1.0, f64::max).min(1.0).acos();
+            assert!(angle <= camera::TURN + 1e-3 && angle > 0.0, "{angle}");
+        }
+        assert!(seen.iter().all(|n| *n > 2), "{seen:?}");
+    }
+
+    #[test]
+    fn a_million_uniform_samples_are_a_few_pictures_and_a_warning() {
+        let list = "[0,0,0,1],".repeat(999_999);
+        let toml = TOML.replace(
+            "tint = [1, 1, 1, 1]",
+            &format!("tint = {{ samples = [{list}[1,1,1,1]] }}"),
+        );
+        let scene = scene(TEXT, &toml).unwrap();
+        assert_eq!(scene.uniform_samples(), MOST_FRAMES / 4);
+        assert_eq!(scene.frames(5.0).len(), MOST_FRAMES);
+        assert_eq!(
+            scene.warnings.last().map(|w| w.message.as_str()),
+            Some("the uniforms have 1000000 samples, of which 64 are drawn, evenly spaced")
+        );
     }
 
     #[test]

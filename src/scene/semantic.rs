@@ -1,6 +1,8 @@
 //! What a uniform means to the scene: matrices, the eye, lights, time; guessed from names and types.
 
-use super::camera::{Pose, Sphere};
+use super::buffers::Draw;
+use super::camera::{Pose, Sphere, TURN, within};
+use super::chance::{child, unit};
 use super::layout::Leaf;
 use crate::front::names::words;
 use glam::{DMat3, DMat4, DVec3};
@@ -149,17 +151,22 @@ impl Semantic {
         }
     }
 
-    /// Its numbers in a pose, for a leaf that it fits, column by column. `sample` counts uniform samples.
-    pub(super) fn numbers(
-        self,
-        leaf: &Leaf,
-        pose: &Pose,
-        sphere: &Sphere,
-        sample: usize,
-    ) -> Vec<f64> {
+    /// Its numbers in a pose, for a leaf that it fits, column by column.
+    pub(super) fn numbers(self, leaf: &Leaf, pose: &Pose, sphere: &Sphere, draw: Draw) -> Vec<f64> {
         let matrix = |m: DMat4| m.to_cols_array().to_vec();
         let four = |v: DVec3, w: f64| v.extend(w).to_array()[..leaf.rows].to_vec();
-        let light = || DVec3::from_array(LIGHTS[sample % LIGHTS.len()]).normalize();
+        let light = || {
+            let listed = draw.one_of(&LIGHTS).copied().unwrap_or(LIGHTS[0]);
+            let direction = DVec3::from_array(listed).normalize();
+            match draw {
+                Draw::Listed(_) => direction,
+                Draw::Chance(seed) => within(direction, TURN, child(seed, 0)),
+            }
+        };
+        let seconds = || match draw {
+            Draw::Listed(_) => draw.one_of(&TIMES).copied().unwrap_or(0.0),
+            Draw::Chance(seed) => unit(child(seed, 1)) * TIMES[TIMES.len() - 1],
+        };
         let inverse = |m: DMat4| match m.determinant() {
             // A model that flattens has no inverse.
             0.0 => DMat4::IDENTITY,
@@ -187,7 +194,7 @@ impl Semantic {
             Self::LightDirection => four(light(), 0.0),
             Self::LightPosition => four(sphere.centre + light() * (4.0 * sphere.radius), 1.0),
             Self::LightColour => vec![1.0; leaf.rows],
-            Self::Time => vec![TIMES[sample % TIMES.len()]],
+            Self::Time => vec![seconds()],
             Self::Resolution => {
                 let [width, height] = pose.resolution.map(f64::from);
                 vec![width, height, 1.0][..leaf.rows].to_vec()
@@ -491,7 +498,7 @@ mod tests {
         let of = |semantic: Semantic, ty: &str, sample| {
             let leaf = leaf("x", ty);
             assert!(semantic.fits(&leaf));
-            let numbers = semantic.numbers(&leaf, &pose, &sphere, sample);
+            let numbers = semantic.numbers(&leaf, &pose, &sphere, Draw::Listed(sample));
             assert_eq!(numbers.len(), leaf.len());
             numbers
         };

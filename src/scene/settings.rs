@@ -1,6 +1,6 @@
 //! The part of a scene file that does not depend on the shader: object, camera, distances, bound, output.
 
-use super::camera::{Sphere, spread};
+use super::camera::{Around, Sphere, spread};
 use super::file::{SceneFile, Toml, suggest};
 use super::mesh::Mesh;
 use super::objects::{Object, bounding_sphere};
@@ -48,6 +48,10 @@ const MOST_LEVELS: i64 = 64;
 const MOST_VIEWS: usize = 256;
 const MOST_OFFSETS: i64 = 64;
 
+/// How many pixels a degree has for whoever looks: a screen 0.7 m wide with 3840 pixels, from 0.7 m away, as
+/// those assume who measure FLIP.
+const PIXELS_PER_DEGREE: f64 = 67.0;
+
 /// How many offsets within a pixel errors are measured at when the file does not say.
 const OFFSETS: i64 = 4;
 
@@ -71,8 +75,10 @@ pub(super) struct Settings {
     pub(super) nearest: f64,
     pub(super) farthest: f64,
     pub(super) offsets: usize,
+    pub(super) pixels_per_degree: f64,
     pub(super) output: Output,
     pub(super) views: Vec<DVec3>,
+    pub(super) around: Around,
     pub(super) warnings: Vec<Diagnostic>,
 }
 
@@ -131,6 +137,7 @@ impl Settings {
         };
         let levels = whole("levels", &file.levels, 5, 1, MOST_LEVELS)?;
         let (nearest, farthest) = read_distances(toml, file, &sphere)?;
+        let (views, around) = read_views(toml, file, object)?;
         let mut warnings = Vec::new();
         if nearest <= sphere.radius {
             let warning = Diagnostic::warning(format!(
@@ -175,8 +182,16 @@ impl Settings {
             nearest,
             farthest,
             offsets: whole("offsets", &file.offsets, OFFSETS, 1, MOST_OFFSETS)? as usize,
+            pixels_per_degree: number(
+                "pixels_per_degree",
+                &file.pixels_per_degree,
+                PIXELS_PER_DEGREE,
+                1.0..1000.0,
+                "1 to 1000 pixels",
+            )?,
             output: read_output(toml, file)?,
-            views: read_views(toml, file, object)?,
+            views,
+            around,
             warnings,
         })
     }
@@ -332,7 +347,7 @@ fn read_output(toml: Toml, file: &SceneFile) -> Result<Output> {
     }
 }
 
-fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<Vec<DVec3>> {
+fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<(Vec<DVec3>, Around)> {
     let views = &file.views;
     if let (Some(directions), Some(count)) = (&views.directions, &views.count) {
         return Err(toml
@@ -352,7 +367,7 @@ fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<Vec<DVec3>
                 format!("these are {}", list.len()),
             ));
         }
-        return list
+        let views = list
             .iter()
             .map(|d| {
                 let vector = DVec3::from_array(*d.get_ref());
@@ -361,7 +376,8 @@ fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<Vec<DVec3>
                         .with_note("it points from the object's centre to the eye")
                 })
             })
-            .collect();
+            .collect::<Result<_>>()?;
+        return Ok((views, Around::Listed));
     }
     let count = match &views.count {
         // Every direction shows the same.
@@ -381,7 +397,12 @@ fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<Vec<DVec3>
         }
     };
     let (axis, angle) = object.visible_from();
-    Ok(spread(count, axis, angle))
+    // One view alone is from the axis, and stands for those near it.
+    let around = match count {
+        1 => Around::Listed,
+        _ => Around::Cap(axis, angle),
+    };
+    Ok((spread(count, axis, angle), around))
 }
 
 #[cfg(test)]

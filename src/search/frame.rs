@@ -1,16 +1,25 @@
 //! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it.
 
-use super::error::{FrameError, Reference, Tally, displayed, encoded};
+use super::error::{FrameError, Reference, TILE, Tally, displayed, encoded};
 use super::samples::Stand;
 use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
-use crate::scene::Output;
+use crate::scene::{Output, chance::mix};
 use std::collections::BTreeSet;
 
 /// Fine pixels of the reference to a pixel, along each axis.
 const GRID: u32 = 4;
+
+/// How much of a frame is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    /// At most so many squares of 2 x 2 pixels.
+    Squares(usize),
+    /// At most so many tiles.
+    Tiles(usize),
+}
 
 /// A frame, rasterised.
 pub(super) struct Rasterised {
@@ -33,14 +42,14 @@ pub(super) struct Drawing {
 }
 
 impl Rasterised {
-    /// Rasterises a frame at each offset, and draws its reference: the original, 4 x 4 samples a pixel. Of more
-    /// than `most` squares of pixels some are chosen, by the seed.
+    /// Rasterises a frame at each offset, and draws its reference: the original, 4 x 4 samples a pixel. Of more pixels
+    /// than the part allows some are chosen, by the seed.
     pub(super) fn new(
         stand: &Stand<'_>,
         original: &Program,
         (view, frame): (usize, Frame),
         offsets: &[[f32; 2]],
-        (most, seed): (usize, u64),
+        (part, seed): (Part, u64),
     ) -> Self {
         let mut fine = frame;
         let mut coverages: Vec<Coverage> = offsets
@@ -55,11 +64,18 @@ impl Rasterised {
         let mut reference = rasterize(stand.vertex, original, &fine);
         let mut squares: Vec<_> = coverages.iter().flat_map(Coverage::squares).collect();
         squares.extend(reference.squares());
-        squares.sort_unstable();
-        squares.dedup();
-        if squares.len() > most {
-            let kept = choose(&squares, most, seed);
-            let part = |coverage: &Coverage| coverage.part(|square| kept.contains(&square));
+        // A square is 2 x 2 pixels.
+        let (side, most) = match part {
+            Part::Squares(most) => (1, most),
+            Part::Tiles(most) => (TILE / 2, most),
+        };
+        let place = |(x, y): (u32, u32)| (x / side, y / side);
+        let mut places: Vec<_> = squares.into_iter().map(place).collect();
+        places.sort_unstable();
+        places.dedup();
+        if places.len() > most {
+            let kept = choose(&places, most.max(1), seed);
+            let part = |coverage: &Coverage| coverage.part(|square| kept.contains(&place(square)));
             coverages = coverages.iter().map(part).collect();
             reference = part(&reference);
         }
@@ -102,6 +118,22 @@ impl Rasterised {
             }
         }
         (tally.finish(), profile)
+    }
+
+    /// FLIP of a program's picture at the first offset: its sum over pixels, and how many those are.
+    pub(super) fn flip(
+        &self,
+        program: &Program,
+        output: Output,
+        pixels_per_degree: f64,
+    ) -> (f64, usize) {
+        let Some(drawing) = self.drawings.first() else {
+            return (0.0, 0);
+        };
+        let mut shading = Shading::default();
+        shade_into(program, &drawing.coverage, &self.bindings, &mut shading);
+        let colours = drawing.colours(&shading, self.reference.len(), output);
+        self.reference.flip(&colours, pixels_per_degree)
     }
 }
 
@@ -190,12 +222,4 @@ fn choose(all: &[(u32, u32)], count: usize, seed: u64) -> BTreeSet<(u32, u32)> {
         .take(count)
         .map(|(_, square)| square)
         .collect()
-}
-
-/// SplitMix64's finaliser (Steele, Lea, Flood 2014): a hash of one word.
-pub(super) fn mix(word: u64) -> u64 {
-    let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    word ^ word >> 31
 }

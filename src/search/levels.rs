@@ -2,16 +2,17 @@
 //!
 //! Distances are spaced evenly in the logarithm from the nearest to the farthest of the scene. The bound
 //! at a distance is Liang's `e_a(d)` (2022, eq. 4). A descent works on a search set of samples; what it
-//! finds becomes a level only when the full set confirms it, at the start, in the middle and at the end of the
-//! interval in which the level is used.
+//! finds becomes a level only when all samples confirm it, at the start, in the middle and at the end of the
+//! interval in which the level is used, and pictures that the search has not seen do not contradict.
 
-use super::error::ErrorFigures;
+use super::confirm::Checks;
+use super::error::{ErrorFigures, HeldOut};
 use super::frontier::{Frontier, Seen};
 use super::greedy::{Descent, Prices, Variant};
 use super::interval::Interval;
-use super::samples::{Measured, SampleSet, Samples, Stand};
+use super::samples::{SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
-use crate::scene::Scene;
+use crate::scene::{Scene, Split};
 use lodc_passes::{Recipe, Shader, Work};
 
 /// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
@@ -30,6 +31,10 @@ pub struct Level {
     pub shader: Shader,
     /// Its error at `distance`, over the full set of samples.
     pub error: ErrorFigures,
+    /// FLIP at `distance`, 0..1.
+    pub flip: f64,
+    /// Its error there on pictures that decided nothing.
+    pub held_out: Option<HeldOut>,
     /// Executed work of a covered fragment at `distance`.
     pub work: Work,
     /// The work as a share of the original's at the same distance: an estimate of the run time.
@@ -47,16 +52,12 @@ impl Level {
             recipe: Recipe::default(),
             shader: stand.base.clone(),
             error: set.floor(),
+            flip: set.flip(stand.base).unwrap_or(1.0),
+            held_out: None,
             work: set.original().work,
             cost: 1.0,
             error_after: Vec::new(),
         }
-    }
-
-    /// Whether it is within the bound at every one of these distances.
-    fn holds(&self, checks: &[SampleSet<'_>]) -> bool {
-        let holds = |set: &SampleSet<'_>| set.measure(&self.shader).is_ok_and(|m| m.strain <= 1.0);
-        self.recipe.0.is_empty() || checks.iter().all(holds)
     }
 }
 
@@ -73,6 +74,9 @@ pub struct AtDistance {
     pub floor_square: f64,
     /// Cheapest first.
     pub frontier: Vec<Seen>,
+    /// How many variants were within the bound on all samples of the scene and were withdrawn, because on pictures
+    /// that the search had not seen they were not.
+    pub withdrawn: usize,
 }
 
 /// Everything that a search found.
@@ -118,8 +122,7 @@ pub fn find(
     let mut seen = Vec::new();
     let mut prices = Prices::default();
     let mut variants = 0;
-    // The samples at the end of one interval are those at the start of the next.
-    let mut end = None;
+    let mut before_checks = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
         let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
         let middle = (distance * next).sqrt();
@@ -149,27 +152,21 @@ pub fn find(
             .iter()
             .filter(|member| member.strain <= 1.0)
             .collect();
-        let begin = match end.take() {
-            Some(set) => set,
-            None => SampleSet::new(stand, distance, Samples::Full)?,
-        };
-        let checks = [
-            begin,
-            SampleSet::new(stand, middle, Samples::Full)?,
-            SampleSet::new(stand, next, Samples::Full)?,
-        ];
+        let checks = Checks::new(stand, [distance, middle, next], before_checks.take())?;
         let before = &levels[levels.len() - 1];
-        let found = cheapest_confirmed(stand, &feasible, &checks);
+        let (found, withdrawn) = checks.cheapest(&feasible);
         let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * before.cost;
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {
             Some(level) if worth(&level) => Some(level),
-            _ if before.holds(&checks) => None,
-            other => Some(other.unwrap_or_else(|| Level::original(stand, &checks[0]))),
+            _ if before.recipe.0.is_empty() || checks.hold(&before.shader) => None,
+            other => Some(other.unwrap_or_else(|| Level::original(stand, checks.start()))),
         };
-        levels.extend(next_level);
-        let [_, _, last] = checks;
-        end = Some(last);
+        if let Some(mut level) = next_level {
+            level.held_out = Some(test(stand, &level)?);
+            levels.push(level);
+        }
+        before_checks = Some(checks);
         let original = search.start().original();
         seen.push(AtDistance {
             distance,
@@ -177,6 +174,7 @@ pub fn find(
             original: original.work,
             floor_square: original.error.square(),
             frontier: frontier.members().to_vec(),
+            withdrawn,
         });
     }
     Ok(Found {
@@ -189,87 +187,13 @@ pub fn find(
 
 /// The autoLOD of a distance as a threshold: rounded up to hundredths, so that it reads well and no level
 /// begins nearer than where it was confirmed.
-fn threshold(scene: &Scene, distance: f64) -> f64 {
+pub(super) fn threshold(scene: &Scene, distance: f64) -> f64 {
     (scene.auto_lod(distance) * 100.0).ceil() / 100.0
 }
 
-/// The cheapest member that every check passes. Error falls as cost rises along a frontier, so the place is
-/// found by bisection, and then confirmed upwards.
-fn cheapest_confirmed(
-    stand: &Stand<'_>,
-    members: &[&Seen],
-    checks: &[SampleSet<'_>],
-) -> Option<Level> {
-    let judge = |member: &Seen| -> Option<Measured> {
-        let shader = member.recipe.replay(stand.base).ok()?;
-        shader.validate().ok()?;
-        let mut first = None;
-        for check in checks {
-            let measured = check.measure(&shader).ok()?;
-            if measured.strain > 1.0 {
-                return None;
-            }
-            first.get_or_insert(measured);
-        }
-        first
-    };
-    let (mut low, mut high) = (0, members.len());
-    let mut best = None;
-    while low < high {
-        let middle = low + (high - low) / 2;
-        match judge(members[middle]) {
-            Some(measured) => {
-                best = Some((members[middle], measured));
-                high = middle;
-            }
-            None => low = middle + 1,
-        }
-    }
-    let (member, measured) = best?;
-    let start = &checks[0];
-    let distance = start.distance();
-    let recipe = minimal(stand.base, &member.recipe);
-    let shader = recipe.replay(stand.base).ok()?;
-    Some(Level {
-        autolod: threshold(stand.scene, distance),
-        distance,
-        error: start.figures(&shader).ok()?,
-        shader,
-        work: measured.work,
-        cost: measured.work.total() / start.original().work.total(),
-        error_after: error_after(stand, &recipe, start),
-        recipe,
-    })
-}
-
-/// A recipe without the steps that later ones have made pointless: the same shader, with less to replay and to say.
-fn minimal(base: &Shader, recipe: &Recipe) -> Recipe {
-    let identity = |recipe: &Recipe| Some(recipe.replay(base).ok()?.fingerprint());
-    let goal = identity(recipe);
-    let mut kept = recipe.clone();
-    for at in (0..recipe.0.len()).rev() {
-        let mut fewer = kept.clone();
-        fewer.0.remove(at);
-        if goal.is_some() && identity(&fewer) == goal {
-            kept = fewer;
-        }
-    }
-    kept
-}
-
-/// The RMSE after each step of a recipe.
-fn error_after(stand: &Stand<'_>, recipe: &Recipe, set: &SampleSet<'_>) -> Vec<f64> {
-    let mut shader = stand.base.clone();
-    let mut errors = Vec::new();
-    for candidate in &recipe.0 {
-        let Ok(next) = lodc_passes::recipe::apply(&shader, candidate) else {
-            break;
-        };
-        shader = next;
-        match set.measure(&shader) {
-            Ok(measured) => errors.push(measured.error.square().sqrt()),
-            Err(_) => break,
-        }
-    }
-    errors
+/// The error of a level on the test split, which decides nothing.
+fn test(stand: &Stand<'_>, level: &Level) -> std::result::Result<HeldOut, Refused> {
+    let set = SampleSet::new(stand, level.distance, Samples::HeldOut(Split::Test))?;
+    let (details, original) = set.pair(&level.shader)?;
+    Ok(HeldOut::new(&details, original))
 }

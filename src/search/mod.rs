@@ -9,6 +9,7 @@
 //!
 //! It knows nothing of the command line or of reports.
 
+mod confirm;
 pub mod error;
 mod facts;
 mod frame;
@@ -18,7 +19,7 @@ mod interval;
 pub mod levels;
 pub mod samples;
 
-pub use error::{Details, ErrorFigures, ErrorSum};
+pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
 pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;

@@ -2,15 +2,25 @@
 //! the reference beside them. A variant is then one run of its fragment program.
 
 use super::error::{Details, ErrorFigures, ErrorSum};
-use super::frame::{Rasterised, mix};
+use super::frame::{Part, Rasterised};
 use crate::eval::program::{Program, Refused};
-use crate::scene::Scene;
+use crate::scene::{
+    Scene, Split,
+    chance::{child, unit},
+};
 use lodc_passes::{Shader, Stage, Work};
 use naga::{Expression, Handle};
 use rayon::prelude::*;
 
 /// Squares of 2 x 2 pixels that a search set has, over all of its frames; a frame has at least one block full.
 const SEARCH_SQUARES: usize = 1024;
+
+/// The most tiles of 8 x 8 pixels that a set has, over all frames and offsets: of larger sets some are chosen, so that
+/// memory does not grow with the scene. That is 6 million fragments, all of 24 pictures of 256 x 256 at four offsets.
+const MOST_TILES: usize = 96 * 1024;
+
+/// How many pictures a held-out split has.
+const HELD_OUT: usize = 16;
 
 /// The least bound that errors are weighed by, so that a bound of 0 weighs them too.
 const LEAST_BOUND: f64 = 1e-6;
@@ -33,6 +43,9 @@ pub enum Samples {
     Search,
     /// All of them: every pixel of every frame at every offset.
     Full,
+    /// Pictures that the search does not see, every pixel of each: independent draws of a view, of the uniforms and of
+    /// an offset, from the ranges of the scene.
+    HeldOut(Split),
 }
 
 /// What was measured of a variant.
@@ -64,23 +77,34 @@ impl<'a> SampleSet<'a> {
     pub fn new(stand: &'a Stand<'a>, distance: f64, samples: Samples) -> Result<Self, Refused> {
         let original = compile(stand.base, &[])?;
         let scene = stand.scene;
-        let frames = scene.frames(distance);
-        let offsets = offsets(scene.offsets, scene.seed);
-        let most = match samples {
-            Samples::Full => usize::MAX,
-            Samples::Search => (SEARCH_SQUARES / frames.len().max(1)).max(64),
+        let frames = match samples {
+            Samples::HeldOut(split) => scene.held_out(distance, split, HELD_OUT),
+            Samples::Search | Samples::Full => scene.frames(distance),
+        };
+        let count = frames.len().max(1);
+        let part = match samples {
+            Samples::Search => Part::Squares((SEARCH_SQUARES / count).max(64)),
+            Samples::Full => Part::Tiles(MOST_TILES / (count * scene.offsets)),
+            Samples::HeldOut(_) => Part::Tiles(MOST_TILES / count),
         };
         let frames = frames
             .into_par_iter()
             .enumerate()
             .map(|(index, frame)| {
-                let offsets = match samples {
-                    Samples::Full => &offsets[..],
-                    Samples::Search => std::slice::from_ref(&offsets[index % offsets.len()]),
+                let seed = child(scene.seed, index as u64);
+                let (view, offsets) = match samples {
+                    Samples::HeldOut(_) => (index, vec![frame.offset]),
+                    Samples::Full => {
+                        let view = index / scene.uniform_samples();
+                        (view, offsets(scene.offsets, seed))
+                    }
+                    Samples::Search => {
+                        let view = index / scene.uniform_samples();
+                        let mut offsets = offsets(scene.offsets, seed);
+                        (view, vec![offsets.swap_remove(index % scene.offsets)])
+                    }
                 };
-                let view = index / scene.uniform_samples().max(1);
-                let seed = scene.seed.wrapping_add(index as u64);
-                Rasterised::new(stand, &original, (view, frame), offsets, (most, seed))
+                Rasterised::new(stand, &original, (view, frame), &offsets, (part, seed))
             })
             .collect();
         let mut set = Self {
@@ -130,6 +154,31 @@ impl<'a> SampleSet<'a> {
         Ok(self.figures_of(&details))
     }
 
+    /// FLIP of a variant: the mean over the pictures of the views and uniform samples, each at its first offset, over
+    /// the pixels that the reference or the picture covers, and over a black and a white background. 0 to 1.
+    ///
+    /// # Errors
+    /// When the evaluator refuses it.
+    pub fn flip(&self, shader: &Shader) -> Result<f64, Refused> {
+        let scene = self.stand.scene;
+        let program = compile(shader, &[])?;
+        let sums: Vec<(f64, usize)> = self
+            .frames
+            .par_iter()
+            .map(|frame| frame.flip(&program, scene.output, scene.pixels_per_degree))
+            .collect();
+        let (sum, count) = sums
+            .iter()
+            .fold((0.0, 0), |(sum, count), (s, c)| (sum + s, count + c));
+        Ok(sum / count.max(1) as f64)
+    }
+
+    /// Measures the original and a variant of it frame by frame: what a held-out split is judged by.
+    pub(super) fn pair(&self, shader: &Shader) -> Result<(Details, &Details), Refused> {
+        let (details, _) = self.details(&compile(shader, &[])?);
+        Ok((details, &self.original.0))
+    }
+
     fn figures_of(&self, details: &Details) -> ErrorFigures {
         let bound = self.stand.scene.bound(self.distance);
         ErrorFigures::new(details, &self.original.0, bound)
@@ -172,7 +221,8 @@ pub(super) fn compile(shader: &Shader, probes: &[Handle<Expression>]) -> Result<
 }
 
 /// Where in a pixel pictures are sampled, from its centre, in pixels, -0.5..0.5: `count` points spread evenly over
-/// the pixel, the same always for a seed. One alone is the centre.
+/// the pixel, the same always for a seed. One alone is the centre. Every frame has a seed of its own: a few points,
+/// always the same, lie further out than a pixel does on average, or less far, and the error with them.
 ///
 /// The points are multiples of the plastic number's powers, which stay far from each other however many they are
 /// (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018), shifted by the seed.
@@ -181,8 +231,7 @@ pub(crate) fn offsets(count: usize, seed: u64) -> Vec<[f32; 2]> {
         return vec![[0.0; 2]];
     }
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
-    let unit = |word: u64| (word >> 11) as f64 / (1u64 << 53) as f64;
-    let shift = [unit(mix(seed)), unit(mix(mix(seed)))];
+    let shift = [0, 1].map(|axis| unit(child(seed, axis)));
     (0..count)
         .map(|i| {
             [0, 1].map(|axis| {

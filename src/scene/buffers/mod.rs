@@ -4,6 +4,7 @@ mod used;
 mod value;
 
 use super::camera::{Pose, Sphere};
+use super::chance::{child, unit};
 use super::file::{Entries, Toml};
 use super::layout::{LARGEST, Layout, Leaf, Place, article};
 use super::semantic::Semantic;
@@ -30,12 +31,23 @@ pub enum Variation {
     Dynamic,
 }
 
+/// Which of their values the sampled parts take in a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Draw {
+    /// Each its i-th, and round again.
+    Listed(usize),
+    /// Any of their ranges, by chance, told by a seed.
+    Chance(u64),
+}
+
 /// Where a part of a buffer gets its numbers from, column by column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Fill {
     Semantic(Semantic),
     Fixed(Vec<f64>),
     Sampled(Vec<Vec<f64>>),
+    /// As `Sampled`; whatever lies between the first and the last is meant too.
+    Range(Vec<Vec<f64>>),
     Dynamic(Vec<f64>),
 }
 
@@ -43,7 +55,7 @@ impl Fill {
     fn variation(&self) -> Variation {
         match self {
             Self::Fixed(_) => Variation::Fixed,
-            Self::Semantic(_) | Self::Sampled(_) => Variation::Sampled,
+            Self::Semantic(_) | Self::Sampled(_) | Self::Range(_) => Variation::Sampled,
             Self::Dynamic(_) => Variation::Dynamic,
         }
     }
@@ -51,7 +63,7 @@ impl Fill {
     fn samples(&self) -> usize {
         match self {
             Self::Semantic(semantic) => semantic.samples(),
-            Self::Sampled(samples) => samples.len(),
+            Self::Sampled(samples) | Self::Range(samples) => samples.len(),
             Self::Fixed(_) | Self::Dynamic(_) => 1,
         }
     }
@@ -114,7 +126,7 @@ impl Buffer {
     pub(super) fn is_constant(&self) -> bool {
         self.parts
             .iter()
-            .all(|(_, fill)| !matches!(fill, Fill::Semantic(_) | Fill::Sampled(_)))
+            .all(|(_, fill)| fill.variation() != Variation::Sampled)
     }
 
     /// Where it is bound.
@@ -122,18 +134,23 @@ impl Buffer {
         (self.group, self.binding)
     }
 
-    /// Its contents in a picture; `sample` counts uniform samples.
-    pub(super) fn resource(&self, pose: &Pose, sphere: &Sphere, sample: usize) -> Resource {
+    /// Its contents in a picture.
+    pub(super) fn resource(&self, pose: &Pose, sphere: &Sphere, draw: Draw) -> Resource {
         let mut bytes = vec![0; self.size];
         for (leaf, fill) in &self.parts {
             match fill {
                 Fill::Semantic(semantic) => {
-                    leaf.write(&semantic.numbers(leaf, pose, sphere, sample), &mut bytes);
+                    leaf.write(&semantic.numbers(leaf, pose, sphere, draw), &mut bytes);
                 }
                 Fill::Fixed(numbers) | Fill::Dynamic(numbers) => leaf.write(numbers, &mut bytes),
                 Fill::Sampled(samples) => {
-                    if let Some(numbers) = samples.get(sample % samples.len().max(1)) {
+                    if let Some(numbers) = draw.one_of(samples) {
                         leaf.write(numbers, &mut bytes);
+                    }
+                }
+                Fill::Range(samples) => {
+                    if let Some(numbers) = draw.between(leaf, samples) {
+                        leaf.write(&numbers, &mut bytes);
                     }
                 }
             }
@@ -154,6 +171,40 @@ impl Buffer {
                 _ => None,
             },
         })
+    }
+}
+
+impl Draw {
+    /// Its one of several: that of the same place in all lists.
+    pub(super) fn one_of<T>(self, listed: &[T]) -> Option<&T> {
+        match self {
+            Self::Listed(sample) => listed.get(sample % listed.len().max(1)),
+            // The same share of each list, so that lists of one length stay together.
+            Self::Chance(seed) => listed.get((unit(seed) * listed.len() as f64) as usize),
+        }
+    }
+
+    /// A value of a range; by chance, all parts of a value alike.
+    fn between(self, leaf: &Leaf, samples: &[Vec<f64>]) -> Option<Vec<f64>> {
+        let seed = match self {
+            Self::Listed(_) => return self.one_of(samples).cloned(),
+            Self::Chance(seed) => seed,
+        };
+        // Ranges are apart from each other: each takes what its own name tells.
+        let share = unit(
+            leaf.path
+                .bytes()
+                .fold(seed, |seed, b| child(seed, b.into())),
+        );
+        let (low, high) = (samples.first()?, samples.last()?);
+        let numbers = low.iter().zip(high).map(|(low, high)| {
+            let number = low + (high - low) * share;
+            match leaf.kind {
+                ScalarKind::Float => number,
+                _ => number.round(),
+            }
+        });
+        Some(numbers.collect())
     }
 }
 
@@ -475,7 +526,7 @@ mod tests {
             radius: 1.0,
         };
         let pose = Pose::new(DMat4::IDENTITY, sphere, DVec3::Z, 3.0, 45.0, [8, 8]);
-        let Resource::Buffer(bytes) = buffer.resource(&pose, &sphere, sample) else {
+        let Resource::Buffer(bytes) = buffer.resource(&pose, &sphere, Draw::Listed(sample)) else {
             panic!()
         };
         bytes

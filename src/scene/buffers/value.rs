@@ -224,6 +224,7 @@ impl Reader<'_> {
                 .map(|(l, n)| (l, Fill::Dynamic(n)))
                 .collect());
         }
+        let listed = has("samples");
         let samples: Vec<Whole> = match entries.get("samples") {
             Some(samples) => {
                 let list = match samples.get_ref() {
@@ -257,7 +258,11 @@ impl Reader<'_> {
                     .filter_map(|s| s.get(i))
                     .map(|(_, n)| n.clone());
                 let all = all.collect();
-                (leaf, Fill::Sampled(all))
+                let fill = match listed {
+                    true => Fill::Sampled(all),
+                    false => Fill::Range(all),
+                };
+                (leaf, fill)
             })
             .collect())
     }

@@ -12,6 +12,8 @@ const SHIMMER_FACTOR: f64 = 0.5;
 pub struct Details {
     /// Over all frames.
     pub error: ErrorSum,
+    /// For each frame.
+    pub(crate) frames: Vec<ErrorSum>,
     /// For each view, over its frames.
     pub(crate) views: Vec<ErrorSum>,
     /// For each tile of each frame, `E^2`.
@@ -32,6 +34,7 @@ impl Details {
                 details.views.resize(view + 1, ErrorSum::default());
             }
             details.views[view].merge(&frame.sum);
+            details.frames.push(frame.sum);
             details.tiles.extend(frame.tiles);
             variance += frame.variance;
             coverage += frame.coverage;

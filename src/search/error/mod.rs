@@ -5,6 +5,7 @@
 //! 4 x 4 fine pixels --pixel--> ReferencePixel      what it should show
 //! reference x drawings --tally--> FrameError       one frame: sums, tiles, shimmer
 //! [FrameError] x [FrameError] --figures--> ErrorFigures    a level against the original and the bound
+//!                            --held_out--> HeldOut         the same on pictures that decided nothing
 //! ```
 //!
 //! Colours are compared as a display shows them: sRGB-encoded, clamped to 0..1, premultiplied with
@@ -14,11 +15,15 @@
 
 mod display;
 mod figures;
+mod flip;
+mod held_out;
 mod pixel;
 mod tally;
 
 pub(crate) use display::{displayed, encoded};
 pub use figures::{Details, ErrorFigures};
+pub use held_out::HeldOut;
+pub(crate) use held_out::exceeds;
 pub(crate) use pixel::ReferencePixel;
 pub use tally::ErrorSum;
-pub(crate) use tally::{FrameError, Reference, Tally};
+pub(crate) use tally::{FrameError, Reference, TILE, Tally};

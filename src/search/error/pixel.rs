@@ -21,6 +21,11 @@ impl ReferencePixel {
         }
     }
 
+    /// Its encoded colours over black and over white.
+    pub(crate) fn over(&self) -> [[f32; 3]; 2] {
+        self.over
+    }
+
     /// What is drawn less the reference: three channels over black, then three over white. `colour` is
     /// encoded; `None` where the picture does not cover the pixel and shows the background.
     /// A NaN on the screen is as wrong as a colour can be: 1.

@@ -1,6 +1,7 @@
 //! One frame's differences added up: over all pixels, by tile, and from offset to offset.
 
 use super::ReferencePixel;
+use super::flip::{flip, reach};
 use std::collections::BTreeMap;
 
 /// Edge of a tile in pixels.
@@ -43,6 +44,8 @@ impl ErrorSum {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reference {
     pixels: Vec<ReferencePixel>,
+    /// Where each is in the picture: column and row.
+    places: Vec<[u32; 2]>,
     /// The reference's coverage, in pixels.
     coverage: f64,
     /// For each pixel, its tile, counted from 0 in the order of the tiles.
@@ -59,6 +62,7 @@ impl Reference {
         let mut places = Vec::new();
         for ([x, y], mean, coverage) in pixels {
             reference.pixels.push(ReferencePixel::new(mean, coverage));
+            reference.places.push([x, y]);
             reference.coverage += f64::from(coverage);
             let tile = (y / TILE, x / TILE);
             *found.entry(tile).or_insert(0.0) += f64::from(coverage);
@@ -68,6 +72,40 @@ impl Reference {
         reference.tiles = places.iter().map(|tile| numbers[tile]).collect();
         reference.tile_coverage = found.into_values().collect();
         reference
+    }
+
+    /// The sum of FLIP over its pixels that it or the drawing covers, the mean over a black and a white
+    /// background, and how many those are.
+    pub(crate) fn flip(
+        &self,
+        colours: &[Option<[f32; 3]>],
+        pixels_per_degree: f64,
+    ) -> (f64, usize) {
+        let bounds = |axis: usize| {
+            let along = self.places.iter().map(|place| place[axis]);
+            Some((along.clone().min()?, along.max()?))
+        };
+        let (Some((left, right)), Some((top, bottom))) = (bounds(0), bounds(1)) else {
+            return (0.0, 0);
+        };
+        // What lies further out shows the background in both pictures.
+        let margin = reach(pixels_per_degree);
+        let width = (right - left) as usize + 1 + 2 * margin;
+        let height = (bottom - top) as usize + 1 + 2 * margin;
+        let at = |[x, y]: [u32; 2]| {
+            (y - top) as usize * width + (x - left) as usize + margin * (width + 1)
+        };
+        let mut sum = 0.0;
+        for (background, empty) in [0.0, 1.0].into_iter().enumerate() {
+            let mut pictures = [(); 2].map(|()| vec![[empty; 3]; width * height]);
+            for ((place, pixel), colour) in self.places.iter().zip(&self.pixels).zip(colours) {
+                pictures[0][at(*place)] = pixel.over()[background];
+                pictures[1][at(*place)] = colour.unwrap_or([empty; 3]);
+            }
+            let map = flip(width, &pictures[0], &pictures[1], pixels_per_degree);
+            sum += self.places.iter().map(|place| map[at(*place)]).sum::<f64>() / 2.0;
+        }
+        (sum, self.places.len())
     }
 
     /// How many pixels it has.
