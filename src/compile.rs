@@ -12,6 +12,7 @@ pub use search::{Compiled, compile, inspect};
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
 use crate::front::{Modules, Source, Stages};
 use crate::{Diagnostic, Result};
+use lodc_passes::autolod::BoundReading;
 use lodc_passes::{Shader, normalize};
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,8 @@ pub struct Request {
     pub shader: PathBuf,
     /// The scene; by default the shader's name with `.toml`, when that is there.
     pub scene: Option<PathBuf>,
+    /// How errors are held against the bound; by default as the scene says.
+    pub bound: Option<BoundReading>,
     /// The shader to write; by default `<stem>.lod.wgsl` beside the source.
     pub output: Option<PathBuf>,
     /// The entry points, where there are several.

@@ -10,6 +10,35 @@
 
 use glam::Mat4;
 
+/// How the error of a level is held against what [`bound`] allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BoundReading {
+    /// What the level adds to the original's own error may be as much, root mean square, over a pixel's channels.
+    #[default]
+    Excess,
+    /// Liang's own: the error against `e_a(d) * s_d` (2022, equations 3 and 6). The error is the sum of squared differences
+    /// over pixels and channels, and `s_d` the size of the object on screen, in pixels.
+    Paper,
+}
+
+impl BoundReading {
+    /// Its name in scenes, locks and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Excess => "excess",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// The reading of a name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        [Self::Excess, Self::Paper]
+            .into_iter()
+            .find(|reading| reading.name() == name)
+    }
+}
+
 /// How far the selection of a level must be overshot before the host changes it, in halvings of scale.
 /// A twentieth of a halving is 3.5 % of the distance.
 pub const HYSTERESIS: f64 = 0.05;

@@ -7,6 +7,7 @@ use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
+use lodc_passes::autolod::BoundReading;
 use progress::Bar;
 use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
@@ -73,6 +74,10 @@ struct CompileArgs {
     /// The language to write [default: the lock's with --locked, else wgsl]
     #[arg(long, value_enum)]
     target: Option<Target>,
+    /// How errors are held against the bound: what a level adds to the original's own error, or all of it, as Liang's
+    /// paper reads it [default: the scene's, else excess]
+    #[arg(long, value_name = "excess|paper", value_parser = reading)]
+    bound: Option<BoundReading>,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
@@ -135,6 +140,10 @@ impl InputArgs {
     }
 }
 
+fn reading(name: &str) -> std::result::Result<BoundReading, String> {
+    BoundReading::of_name(name).ok_or_else(|| "it is `excess` or `paper`".to_owned())
+}
+
 fn inspect(input: InputArgs) -> Result<()> {
     print(&compile::inspect(&input.request()?)?);
     Ok(())
@@ -143,6 +152,7 @@ fn inspect(input: InputArgs) -> Result<()> {
 fn compile_command(arguments: CompileArgs) -> Result<()> {
     let mut request = arguments.input.request()?;
     request.output = arguments.output;
+    request.bound = arguments.bound;
     request.form = arguments.form;
     request.target = arguments.target;
     request.command = std::iter::once("lodc".to_owned())

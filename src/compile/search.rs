@@ -58,7 +58,8 @@ impl Ready {
         let base = normal_form(&source)?;
         let fragment = base.index(Stage::Fragment).unwrap_or(0);
         Program::compile(base.module(), fragment, &[]).map_err(|what| refused(&source, &what))?;
-        let scene = Scene::read(&source, scene_file.as_deref())?;
+        let mut scene = Scene::read(&source, scene_file.as_deref())?;
+        scene.reading = request.bound.unwrap_or(scene.reading);
         Ok(Self {
             request,
             source,
@@ -197,6 +198,7 @@ impl Ready {
             command: request.command.clone(),
             seed: self.scene.seed,
             pixels_per_degree: self.scene.pixels_per_degree,
+            bound: self.scene.reading.name(),
             inputs: self
                 .scene
                 .inputs
@@ -282,6 +284,7 @@ impl Ready {
                 })
                 .collect(),
             output: request.emission(Output::default()),
+            bound: self.scene.reading,
             seed: self.scene.seed,
             rho0: figure(found.rho0),
             levels: found

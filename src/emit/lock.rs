@@ -10,6 +10,7 @@
 use super::{EmitLevel, Output};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
+use lodc_passes::autolod::BoundReading;
 use lodc_passes::{Candidate, PASSES, Recipe, Shader};
 use serde::Deserialize;
 use std::fmt::Write;
@@ -33,6 +34,8 @@ pub struct Lock {
     pub textures: Vec<LockedTexture>,
     /// What is emitted.
     pub output: Output,
+    /// How errors were held against the bound.
+    pub bound: BoundReading,
     /// The seed of everything that was drawn at random, below 2^63 (TOML has no larger integers).
     pub seed: u64,
     /// Pixels on screen per object unit at the nearest distance, where autoLOD is 0.
@@ -169,6 +172,10 @@ impl Lock {
             string(self.output.form.name()),
             string(self.output.target.name())
         ));
+        // The usual one is not said.
+        if self.bound != BoundReading::default() {
+            line(format!("bound = {}", string(self.bound.name())));
+        }
         line(format!("seed = {}", self.seed));
         line(format!("rho0 = {}", number(self.rho0)));
         if !self.textures.is_empty() {
@@ -301,6 +308,7 @@ impl Lock {
             scene: raw.scene,
             textures: raw.textures,
             output: raw.output,
+            bound: raw.bound,
             seed: raw.seed,
             rho0: raw.rho0,
             levels,
@@ -455,6 +463,8 @@ struct RawLock {
     textures: Vec<LockedTexture>,
     #[serde(default)]
     output: Output,
+    #[serde(default)]
+    bound: BoundReading,
     seed: u64,
     rho0: f64,
     #[serde(default)]
@@ -585,6 +595,7 @@ mod tests {
                 form: Form::Uniform,
                 target: Target::Spirv,
             },
+            bound: BoundReading::Paper,
             seed: u64::from(u32::MAX) + 7,
             rho0: 211.34,
             levels: vec![

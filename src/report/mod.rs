@@ -27,6 +27,8 @@ pub struct Report {
     pub rho0: f64,
     /// Pixels per degree of what is looked at, for FLIP.
     pub pixels_per_degree: f64,
+    /// How errors were held against the bound: `excess` or `paper`.
+    pub bound: &'static str,
     /// How many variants were measured.
     pub variants: u64,
     /// Level 0, the original, first.
@@ -201,6 +203,8 @@ pub struct Origin {
     pub seed: u64,
     /// Pixels per degree of what is looked at.
     pub pixels_per_degree: f64,
+    /// How errors were held against the bound.
+    pub bound: &'static str,
     /// What was read.
     pub inputs: Vec<Input>,
     /// Triangles of the scene's mesh.
@@ -229,6 +233,7 @@ impl Report {
             version: env!("CARGO_PKG_VERSION"),
             rho0: found.rho0,
             pixels_per_degree: origin.pixels_per_degree,
+            bound: origin.bound,
             variants: found.variants,
             levels: found.levels.iter().zip(says).map(level).collect(),
             frontier: found.distances.iter().flat_map(frontier).collect(),

@@ -36,7 +36,7 @@ use camera::{Around, Pose, Sphere};
 use chance::{child, unit};
 use file::Toml;
 use glam::{DMat4, DVec3};
-use lodc_passes::autolod;
+use lodc_passes::autolod::{self, BoundReading};
 use mesh::Mesh;
 use naga::{Binding, Span};
 use objects::Object;
@@ -74,6 +74,8 @@ pub struct Scene {
     pub nearest: f64,
     /// The farthest distance, where the error may be `e_max`.
     pub farthest: f64,
+    /// How errors are held against the bound.
+    pub reading: BoundReading,
     /// How many offsets within a pixel errors are measured at.
     pub offsets: usize,
     /// How many pixels a degree has for whoever looks at a picture, for FLIP.
@@ -272,6 +274,7 @@ impl Scene {
             distances: settings.distances,
             nearest: settings.nearest,
             farthest: settings.farthest,
+            reading: settings.reading,
             offsets: settings.offsets,
             pixels_per_degree: settings.pixels_per_degree,
             output: settings.output,

@@ -7,7 +7,7 @@ use super::objects::{Object, bounding_sphere};
 use crate::eval::raster::MAX_EDGE;
 use crate::{Diagnostic, Result};
 use glam::{DMat4, DVec3};
-use lodc_passes::autolod;
+use lodc_passes::autolod::{self, BoundReading};
 use std::ops::Range;
 use toml::Spanned;
 
@@ -74,6 +74,7 @@ pub(super) struct Settings {
     pub(super) distances: Vec<f64>,
     pub(super) nearest: f64,
     pub(super) farthest: f64,
+    pub(super) reading: BoundReading,
     pub(super) offsets: usize,
     pub(super) pixels_per_degree: f64,
     pub(super) output: Output,
@@ -181,6 +182,18 @@ impl Settings {
             distances: autolod::distances(nearest, farthest, levels as usize),
             nearest,
             farthest,
+            reading: match &file.bound {
+                None => BoundReading::default(),
+                Some(name) => BoundReading::of_name(name.get_ref()).ok_or_else(|| {
+                    let error = toml.error(
+                        format!("there is no bound `{}`", name.get_ref()),
+                        name.span(),
+                        "",
+                    );
+                    let known = [BoundReading::Excess, BoundReading::Paper].map(BoundReading::name);
+                    suggest(error, name.get_ref(), &known)
+                })?,
+            },
             offsets: whole("offsets", &file.offsets, OFFSETS, 1, MOST_OFFSETS)? as usize,
             pixels_per_degree: number(
                 "pixels_per_degree",

@@ -75,7 +75,8 @@ impl<'a> Checks<'a> {
         }
         for set in &self.validation {
             let (details, original) = set.pair(shader)?;
-            let bound = self.stand.scene.bound(set.distance());
+            let scene = self.stand.scene;
+            let bound = (scene.bound(set.distance()), scene.reading);
             if exceeds(&details, original, bound) {
                 return Ok(Verdict::Withdrawn);
             }

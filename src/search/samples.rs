@@ -180,7 +180,8 @@ impl<'a> SampleSet<'a> {
     }
 
     fn figures_of(&self, details: &Details) -> ErrorFigures {
-        let bound = self.stand.scene.bound(self.distance);
+        let scene = self.stand.scene;
+        let bound = (scene.bound(self.distance), scene.reading);
         ErrorFigures::new(details, &self.original.0, bound)
     }
 

@@ -1,6 +1,7 @@
 //! The figures of a level: its own, those of the original, and how much of its bound it uses up.
 
 use super::tally::{ErrorSum, FrameError};
+use lodc_passes::autolod::BoundReading;
 
 /// How many times the bound the worst view and the worst tile may exceed, and a level shimmer.
 const VIEW_FACTOR: f64 = 2.0;
@@ -58,8 +59,10 @@ pub struct ErrorFigures {
     pub rmse: f64,
     /// E(o): that of the original, which aliases.
     pub floor: f64,
-    /// The bound `e_a(d)` on the excess.
+    /// The bound `e_a(d)`.
     pub bound: f64,
+    /// How it is read.
+    pub reading: BoundReading,
     /// The largest difference of a channel of a pixel.
     pub max: f64,
     /// The largest excess of one view.
@@ -74,7 +77,11 @@ pub struct ErrorFigures {
 
 impl ErrorFigures {
     /// From what was measured of the level and of the original, over the same frames.
-    pub(crate) fn new(level: &Details, original: &Details, bound: f64) -> Self {
+    pub(crate) fn new(
+        level: &Details,
+        original: &Details,
+        (bound, reading): (f64, BoundReading),
+    ) -> Self {
         let worst = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
             pairs.map(|(v, o)| v - o).fold(0.0_f64, f64::max).sqrt()
         };
@@ -84,6 +91,7 @@ impl ErrorFigures {
             rmse: level.error.square().sqrt(),
             floor: original.error.square().sqrt(),
             bound,
+            reading,
             max: f64::from(level.error.max),
             worst_view: worst(&mut views.map(|(v, o)| (v.square(), o.square()))),
             worst_tile: worst(&mut tiles.map(|(v, o)| (*v, *o))),
@@ -106,7 +114,8 @@ impl ErrorFigures {
 
     /// How much of its bound the level uses up, the most of four: the excess over `e_a`, that of the worst
     /// view over `2 e_a`, that of the worst tile over `4 e_a`, and what it shimmers more than the original over
-    /// `e_a / 2`. It is feasible when this is at most 1.
+    /// `e_a / 2`. It is feasible when this is at most 1. In the paper's reading it is the error alone, with all of the
+    /// original's own in it.
     pub fn strain(&self) -> f64 {
         let share = |what: f64, factor: f64| {
             let limit = factor * self.bound;
@@ -118,6 +127,10 @@ impl ErrorFigures {
                 f64::INFINITY
             }
         };
+        if self.reading == BoundReading::Paper {
+            // The paper's norm sums three channels where E^2 is their mean; both sides are divided by the size on screen.
+            return share(3.0 * self.rmse * self.rmse, 1.0);
+        }
         share(self.excess(), 1.0)
             .max(share(self.worst_view, VIEW_FACTOR))
             .max(share(self.worst_tile, TILE_FACTOR))
@@ -171,7 +184,11 @@ mod tests {
         let level = details(&white, &[level]);
         // 4 of 16 pixels, (0.25 + 0.0625 + 0) / 3 each.
         close(level.error.square(), 4.0 / 16.0 * 0.3125 / 3.0);
-        let figures = ErrorFigures::new(&level, &details(&white, &[[WHITE; 16]]), 0.1);
+        let figures = ErrorFigures::new(
+            &level,
+            &details(&white, &[[WHITE; 16]]),
+            (0.1, BoundReading::Excess),
+        );
         close(figures.rmse, 0.161_374_3);
         close(figures.max, 0.5);
         // -10 log10(0.02604167)
@@ -211,17 +228,20 @@ mod tests {
         let white = reference(|_| (1.0, 1.0));
         let off = |by: f32| details(&white, &[[Some([1.0 - by; 3]); 16]]);
         // 0.5^2 - 0.3^2 = 0.4^2
-        let figures = ErrorFigures::new(&off(0.5), &off(0.3), 0.8);
+        let figures = ErrorFigures::new(&off(0.5), &off(0.3), (0.8, BoundReading::Excess));
         close(figures.rmse, 0.5);
         close(figures.floor, 0.3);
         close(figures.excess(), 0.4);
         close(figures.strain(), 0.5);
         // Better than the original is no excess.
-        let better = ErrorFigures::new(&off(0.1), &off(0.3), 0.8);
+        let better = ErrorFigures::new(&off(0.1), &off(0.3), (0.8, BoundReading::Excess));
         assert_eq!((better.excess(), better.strain()), (0.0, 0.0));
         // A bound of 0 takes nothing but what adds nothing.
-        assert_eq!(ErrorFigures::new(&off(0.3), &off(0.3), 0.0).strain(), 0.0);
-        let none = ErrorFigures::new(&off(0.4), &off(0.3), 0.0).strain();
+        assert_eq!(
+            ErrorFigures::new(&off(0.3), &off(0.3), (0.0, BoundReading::Excess)).strain(),
+            0.0
+        );
+        let none = ErrorFigures::new(&off(0.4), &off(0.3), (0.0, BoundReading::Excess)).strain();
         assert_eq!(none, f64::INFINITY);
     }
 
@@ -233,7 +253,7 @@ mod tests {
         let bad = || frame(&white, &[[Some([0.5; 3]); 16]]);
         let level = Details::new([(0, good()), (0, good()), (0, good()), (1, bad())]);
         let original = Details::new([(0, good()), (0, good()), (0, good()), (1, good())]);
-        let figures = ErrorFigures::new(&level, &original, 0.25);
+        let figures = ErrorFigures::new(&level, &original, (0.25, BoundReading::Excess));
         // A quarter of all pixels.
         close(figures.excess(), 0.25);
         close(figures.worst_view, 0.5);
@@ -245,7 +265,7 @@ mod tests {
         let drawn = |c| std::array::from_fn(|i| if i == 0 { Some([c; 3]) } else { None });
         let off = details(&corner, &[drawn(0.5)]);
         let exact = details(&corner, &[drawn(1.0)]);
-        let figures = ErrorFigures::new(&off, &exact, 1.0);
+        let figures = ErrorFigures::new(&off, &exact, (1.0, BoundReading::Excess));
         close(figures.worst_tile, (0.25_f64 / 16.0).sqrt());
         close(figures.worst_view, 0.5);
     }
@@ -273,7 +293,11 @@ mod tests {
         assert_eq!(steady.shimmer(), 0.0);
         // The mean over both offsets: 0.25 / 32.
         close(level.error.square(), 0.25 / 32.0);
-        let figures = ErrorFigures::new(&level, &details(&white, &[[WHITE; 16]; 2]), 0.2);
+        let figures = ErrorFigures::new(
+            &level,
+            &details(&white, &[[WHITE; 16]; 2]),
+            (0.2, BoundReading::Excess),
+        );
         // 0.0884 of 0.1 shimmer, 0.0884 of 0.2 excess.
         close(figures.strain(), 0.883_883_5);
         // A pixel that comes and goes shimmers as its contrast with the backgrounds does: 1 over black, 0 over white.
@@ -281,6 +305,17 @@ mod tests {
         gone[5] = None;
         let flicker = details(&white, &[[WHITE; 16], gone]);
         close(flicker.shimmer(), (0.5 * 0.5_f64 / 16.0).sqrt());
+    }
+
+    #[test]
+    fn the_papers_reading_sums_channels_and_knows_no_floor() {
+        let white = reference(|_| (1.0, 1.0));
+        let off = |by: f32| details(&white, &[[Some([1.0 - by; 3]); 16]]);
+        // 16 pixels of 3 * 0.1^2 against 16 * 0.05, whatever the original does.
+        for original in [0.0, 0.1, 0.4] {
+            let figures = ErrorFigures::new(&off(0.1), &off(original), (0.05, BoundReading::Paper));
+            close(figures.strain(), 0.6);
+        }
     }
 
     #[test]

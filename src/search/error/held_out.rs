@@ -5,6 +5,7 @@
 //! "Sampling Techniques", 1977, section 2.11): the residuals `S_i - R C_i` of the pictures, as independent numbers.
 
 use super::figures::Details;
+use lodc_passes::autolod::BoundReading;
 
 /// How many standard errors above its bound an excess is no chance any more: one time in forty it is.
 const ERRORS: f64 = 2.0;
@@ -39,11 +40,22 @@ impl HeldOut {
 }
 
 /// Whether a level's excess is over the bound by more than chance explains.
-pub(crate) fn exceeds(level: &Details, original: &Details, bound: f64) -> bool {
+pub(crate) fn exceeds(
+    level: &Details,
+    original: &Details,
+    (bound, reading): (f64, BoundReading),
+) -> bool {
     let pairs = level.frames.iter().zip(&original.frames);
-    let added = pairs.map(|(level, original)| (level.squares - original.squares, level.coverage));
-    let (square, standard_error) = ratio(added);
-    square - ERRORS * standard_error.unwrap_or(0.0) > bound * bound
+    let added = pairs.map(|(level, original)| match reading {
+        BoundReading::Excess => (level.squares - original.squares, level.coverage),
+        BoundReading::Paper => (3.0 * level.squares, level.coverage),
+    });
+    let allowed = match reading {
+        BoundReading::Excess => bound * bound,
+        BoundReading::Paper => bound,
+    };
+    let (found, standard_error) = ratio(added);
+    found - ERRORS * standard_error.unwrap_or(0.0) > allowed
 }
 
 /// The sum of the first over the sum of the second numbers, and its standard error.
@@ -104,11 +116,27 @@ mod tests {
         let original = details(&[(0.0, 8.0); 4]);
         let level = details(&[(0.5, 8.0), (1.5, 8.0), (0.5, 8.0), (1.5, 8.0)]);
         // 4 / 32 = 0.125; residuals of 0.5; sqrt(4 * 0.25 * 4 / 3) / 32 = 0.0361.
-        assert!(exceeds(&level, &original, 0.05_f64.sqrt()));
-        assert!(!exceeds(&level, &original, 0.06_f64.sqrt()));
+        assert!(exceeds(
+            &level,
+            &original,
+            (0.05_f64.sqrt(), BoundReading::Excess)
+        ));
+        assert!(!exceeds(
+            &level,
+            &original,
+            (0.06_f64.sqrt(), BoundReading::Excess)
+        ));
         // The same everywhere is no chance.
         let steady = details(&[(1.0, 8.0); 4]);
-        assert!(exceeds(&steady, &original, 0.12_f64.sqrt()));
-        assert!(!exceeds(&steady, &original, 0.13_f64.sqrt()));
+        assert!(exceeds(
+            &steady,
+            &original,
+            (0.12_f64.sqrt(), BoundReading::Excess)
+        ));
+        assert!(!exceeds(
+            &steady,
+            &original,
+            (0.13_f64.sqrt(), BoundReading::Excess)
+        ));
     }
 }
