@@ -179,7 +179,12 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
     let base = normal_form(&source)?;
     let levels = lock.replay(&base, &path.display().to_string(), &text)?;
     let changed = |file: &str, hash: &str| {
-        std::fs::read(folder.join(file)).map_or(true, |bytes| emit::hash(&bytes) != hash)
+        let Ok(bytes) = std::fs::read(folder.join(file)) else {
+            return true;
+        };
+        // A byte order mark is no part of a text that was read.
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+        emit::hash(text) != hash
     };
     for texture in &lock.textures {
         if changed(&texture.file, &texture.hash) {
@@ -191,18 +196,20 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
         }
     }
     let mut warnings = Vec::new();
-    if let Some(scene) = &lock.scene
-        && changed(&scene.file, &scene.hash)
-    {
-        warnings.push(
-            Diagnostic::warning(format!(
-                "the scene `{}` has changed since the lock was made",
-                scene.file
-            ))
-            .with_note(
-                "the levels are those of the old scene; run lodc without `--locked` to renew them",
-            ),
-        );
+    for (what, file) in [("scene", &lock.scene), ("lighting shader", &lock.lighting)] {
+        if let Some(file) = file
+            && changed(&file.file, &file.hash)
+        {
+            warnings.push(
+                Diagnostic::warning(format!(
+                    "the {what} `{}` has changed since the lock was made",
+                    file.file
+                ))
+                .with_note(format!(
+                    "the levels are those of the old {what}; run lodc without `--locked` to renew them"
+                )),
+            );
+        }
     }
     let files = request.emitted(&source, &levels, request.emission(lock.output))?;
     request.spare(&files, std::slice::from_ref(&request.shader))?;

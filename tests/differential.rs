@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 fn small_materials() -> Vec<PathBuf> {
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
     let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("differential");
-    std::fs::create_dir_all(to.join("textures")).expect("the target folder can be written");
-    for folder in ["", "textures"] {
+    for folder in ["", "textures", "lighting"] {
+        std::fs::create_dir_all(to.join(folder)).expect("the target folder can be written");
         for entry in std::fs::read_dir(from.join(folder)).expect("the folder is there") {
             let path = entry.expect("it can be listed").path();
             let Some(name) = path.file_name().filter(|_| path.is_file()) else {
@@ -120,7 +120,11 @@ fn assert_same(name: &str, scene: &Scene, a: &(Program, Program), b: &(Program, 
                 !left.colours.is_empty(),
                 "{name}: nothing to see at {distance}"
             );
-            for (i, (l, r)) in left.colours.iter().zip(&right.colours).enumerate() {
+            assert_eq!(left.targets.len(), right.targets.len());
+            let further = left.targets.iter().zip(&right.targets);
+            let all = [(&left.colours, &right.colours)].into_iter().chain(further);
+            let all = all.flat_map(|(l, r)| l.iter().zip(r).enumerate());
+            for (i, (l, r)) in all {
                 if left.alive[i] {
                     assert_eq!(
                         bits(*l),

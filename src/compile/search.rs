@@ -2,7 +2,7 @@
 
 use super::{Files, Request, normal_form, relative};
 use crate::emit::{self, EmitLevel, Lock, Output, figure};
-use crate::eval::program::{Program, Refused};
+use crate::eval::program::Program;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
 use crate::scene::{Reading, Scene, SceneTexture};
@@ -57,7 +57,7 @@ impl Ready {
         // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
         let fragment = base.index(Stage::Fragment).unwrap_or(0);
-        Program::compile(base.module(), fragment, &[]).map_err(|what| refused(&source, &what))?;
+        Program::compile(base.module(), fragment, &[]).map_err(|refused| refused.at(&source))?;
         let mut scene = Scene::read(&source, scene_file.as_deref())?;
         scene.reading = request.bound.unwrap_or(scene.reading);
         Ok(Self {
@@ -75,15 +75,8 @@ impl Ready {
             (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
             (None, index) => Program::compile(self.base.module(), index.unwrap_or(0), &[]),
         };
-        compiled.map_err(|what| refused(&self.source, &what))
+        compiled.map_err(|refused| refused.at(&self.source))
     }
-}
-
-/// What the evaluator refuses, at its place.
-fn refused(source: &Source, refused: &Refused) -> Box<Diagnostic> {
-    let error = Diagnostic::error(format!("lodc cannot evaluate {}", refused.what))
-        .with_note("errors are measured by running the shader on the CPU, which does not do this");
-    source.locate(error, refused.span, "here")
 }
 
 /// Compiles a material shader: searches its levels, and makes the files that hold them.
@@ -105,7 +98,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         vertex: &vertex,
         scene: &ready.scene,
     };
-    let found = search::find(&stand, progress).map_err(|what| refused(&ready.source, &what))?;
+    let found = search::find(&stand, progress).map_err(|refused| refused.at(&ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     let levels: Vec<EmitLevel> = found
         .levels
@@ -166,10 +159,12 @@ impl Ready {
             .iter()
             .flat_map(|texture| self.texture_files(texture));
         let others = self.source.others.iter();
+        let lighting = self.scene.lighting.as_ref();
         [request.shader.clone()]
             .into_iter()
             .chain(others.filter_map(|file| file.path.clone()))
             .chain(self.scene_file.clone())
+            .chain(lighting.map(|lighting| self.beside_scene(&lighting.file)))
             .chain(textures)
     }
 
@@ -184,12 +179,14 @@ impl Ready {
         &'a self,
         texture: &'a SceneTexture,
     ) -> impl Iterator<Item = PathBuf> + 'a {
-        let folder = self
-            .scene_file
-            .as_ref()
-            .and_then(|file| file.parent())
-            .unwrap_or(Path::new(""));
-        texture.files.iter().map(move |file| folder.join(file))
+        let files = texture.files.iter();
+        files.map(|file| self.beside_scene(file))
+    }
+
+    /// The path of a file that the scene names.
+    fn beside_scene(&self, file: &str) -> PathBuf {
+        let scene = self.scene_file.as_ref().and_then(|scene| scene.parent());
+        scene.unwrap_or(Path::new("")).join(file)
     }
 
     fn origin(&self, request: &Request) -> Origin {
@@ -266,6 +263,14 @@ impl Ready {
                 file: relative(folder, file),
                 hash: self.hash_of(&file.display().to_string()),
             }),
+            lighting: self
+                .scene
+                .lighting
+                .as_ref()
+                .map(|lighting| emit::LockedFile {
+                    file: relative(folder, &self.beside_scene(&lighting.file)),
+                    hash: self.hash_of(&lighting.file),
+                }),
             textures: self
                 .scene
                 .textures
@@ -346,7 +351,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let distances = &ready.scene.distances;
     let distance = distances[distances.len() / 2];
     let set = SampleSet::new(&stand, distance, Samples::Search)
-        .map_err(|what| refused(&ready.source, &what))?;
+        .map_err(|refused| refused.at(&ready.source))?;
     let facts = set.facts(&ready.base);
     let candidates: Vec<Candidate> = PASSES
         .iter()

@@ -30,6 +30,8 @@ pub struct Lock {
     pub modules: LockedModules,
     /// The scene file that errors were measured over; `None` when there was none, and all was inferred.
     pub scene: Option<LockedFile>,
+    /// The full-screen shader that lit the material in a deferred scene.
+    pub lighting: Option<LockedFile>,
     /// Every texture whose texels went into a number of a recipe.
     pub textures: Vec<LockedTexture>,
     /// What is emitted.
@@ -160,12 +162,14 @@ impl Lock {
                 definitions.join(", ")
             ));
         }
-        if let Some(scene) = &self.scene {
-            line(format!(
-                "scene = {{ file = {}, hash = {} }}",
-                string(&scene.file),
-                string(&scene.hash)
-            ));
+        for (key, file) in [("scene", &self.scene), ("lighting", &self.lighting)] {
+            if let Some(file) = file {
+                line(format!(
+                    "{key} = {{ file = {}, hash = {} }}",
+                    string(&file.file),
+                    string(&file.hash)
+                ));
+            }
         }
         line(format!(
             "output = {{ form = {}, target = {} }}",
@@ -306,6 +310,7 @@ impl Lock {
                     .collect::<Result<_>>()?,
             },
             scene: raw.scene,
+            lighting: raw.lighting,
             textures: raw.textures,
             output: raw.output,
             bound: raw.bound,
@@ -459,6 +464,7 @@ struct RawLock {
     #[serde(default)]
     modules: RawModules,
     scene: Option<LockedFile>,
+    lighting: Option<LockedFile>,
     #[serde(default)]
     textures: Vec<LockedTexture>,
     #[serde(default)]
@@ -584,6 +590,10 @@ mod tests {
             scene: Some(LockedFile {
                 file: "brick.toml".into(),
                 hash: hash(b"scene"),
+            }),
+            lighting: Some(LockedFile {
+                file: "lighting/deferred.wgsl".into(),
+                hash: hash(b"lighting"),
             }),
             textures: vec![LockedTexture {
                 name: "grime".into(),

@@ -2,6 +2,7 @@
 //!
 //! All of it is f64 arithmetic without platform functions, so that matrices have the same bits everywhere.
 
+use super::buffers::Draw;
 use super::chance::{child, unit};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
@@ -27,6 +28,17 @@ pub struct Pose {
     pub eye: DVec3,
     /// Width and height in pixels.
     pub resolution: [u32; 2],
+}
+
+/// What a frame is a picture of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shot {
+    /// A unit vector from the centre of the object's bounding sphere to the eye.
+    pub direction: DVec3,
+    /// From the eye to that centre, world units.
+    pub distance: f64,
+    /// What the sampled uniforms hold in it.
+    pub draw: Draw,
 }
 
 /// The nearest near plane, as a share of the sphere's radius.
@@ -62,6 +74,19 @@ impl Pose {
             ),
             eye,
             resolution,
+        }
+    }
+
+    /// The pose for a pass over a picture that was sampled off its pixels' centres, by `offset` in pixels, at `grid`
+    /// fine pixels a pixel: at the centres of the pass's pixels is what was drawn there.
+    pub(crate) fn moved(&self, offset: [f32; 2], grid: u32) -> Self {
+        let [width, height] = self.resolution.map(f64::from);
+        let [x, y] = offset.map(f64::from);
+        let shift = DVec3::new(-2.0 * x / width, 2.0 * y / height, 0.0);
+        Self {
+            projection: DMat4::from_translation(shift) * self.projection,
+            resolution: self.resolution.map(|n| n * grid),
+            ..*self
         }
     }
 

@@ -45,6 +45,25 @@ pub(super) struct SceneFile {
     pub(super) samplers: Entries,
     #[serde(default)]
     pub(super) attributes: Entries,
+    pub(super) lighting: Option<Spanned<LightingTable>>,
+    #[serde(default)]
+    pub(super) targets: Entries,
+}
+
+/// `[lighting]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LightingTable {
+    pub(super) shader: Option<Spanned<String>>,
+    pub(super) fragment: Option<String>,
+    #[serde(default)]
+    pub(super) uniforms: Entries,
+    #[serde(default)]
+    pub(super) storage: Entries,
+    #[serde(default)]
+    pub(super) textures: Entries,
+    #[serde(default)]
+    pub(super) samplers: Entries,
 }
 
 /// `[shader]`.
@@ -242,6 +261,7 @@ impl Toml<'_> {
                 ("struct Modules", "a table"),
                 ("struct Distance", "a table"),
                 ("struct Views", "a table"),
+                ("struct LightingTable", "a table"),
             ];
             let message = message.lines().collect::<Vec<_>>().join(", ");
             located(

@@ -13,6 +13,7 @@ pub mod camera;
 pub(crate) mod chance;
 mod file;
 mod layout;
+mod lighting;
 pub mod mesh;
 pub mod objects;
 mod semantic;
@@ -20,19 +21,20 @@ mod settings;
 mod shader;
 mod textures;
 
-pub use buffers::{Uniform, Variation};
+pub use buffers::{Draw, Uniform, Variation};
+pub use lighting::SceneLighting;
 pub use semantic::Semantic;
 pub use settings::{Output, ToneMapping};
 pub use shader::Reading;
 pub use textures::SceneTexture;
 
+use crate::eval::draw::Lit;
 use crate::eval::machine::{Bindings, Resource};
-use crate::eval::raster::{Attribute, Frame};
+use crate::eval::raster::{Attribute, Coverage, Frame};
 use crate::front::{Source, VertexStage, inputs, read_text};
 use crate::{Diagnostic, Result};
-use buffers::Draw;
 use buffers::{Buffer, Said};
-use camera::{Around, Pose, Sphere};
+use camera::{Around, Pose, Shot, Sphere};
 use chance::{child, unit};
 use file::Toml;
 use glam::{DMat4, DVec3};
@@ -92,6 +94,8 @@ pub struct Scene {
     pub textures: Vec<SceneTexture>,
     /// The vertex stage that lodc supplies, when the file has none.
     pub vertex_stage: Option<VertexStage>,
+    /// What lights the material's outputs, in a deferred scene.
+    pub lighting: Option<SceneLighting>,
     /// What was told from names and types.
     pub inferences: Vec<Inference>,
     /// What should be known besides.
@@ -224,6 +228,15 @@ impl Scene {
             &file_values.samplers,
             place,
         )?;
+        let mut found = lighting::Found::default();
+        let lighting = lighting::resolve(
+            source,
+            toml,
+            file_values.lighting.as_ref(),
+            &file_values.targets,
+            place,
+            &mut found,
+        )?;
         let mut inferences = said.inferences;
         let fed = attributes::resolve(
             source,
@@ -240,6 +253,7 @@ impl Scene {
             return Err(buffers::missing_error(source, &place, &said.missing));
         }
         inferences.extend(images.inferences);
+        inferences.extend(found.inferences);
         let uniforms = buffers.iter().flat_map(Buffer::uniforms).collect();
         if let Some(stage) = &fed.stage {
             buffers.extend(Buffer::of_semantics(&stage.module));
@@ -260,6 +274,9 @@ impl Scene {
         }));
         let files = images.inputs.into_iter();
         inputs.extend(files.map(|(name, hash)| InputFile { name, hash }));
+        inputs.extend(found.inputs);
+        let lit = lighting.as_ref().map_or(1, SceneLighting::samples);
+        let samples = buffers.iter().map(Buffer::samples).max().unwrap_or(1);
         let mut scene = Self {
             name: file.map(|_| name.clone()),
             object: settings.object,
@@ -284,10 +301,11 @@ impl Scene {
             textures: images.textures,
             vertex_stage: fed.stage,
             inferences,
-            warnings: [settings.warnings, images.warnings].concat(),
+            warnings: [settings.warnings, images.warnings, found.warnings].concat(),
             inputs,
             attributes: fed.attributes,
-            samples: buffers.iter().map(Buffer::samples).max().unwrap_or(1),
+            samples: samples.max(lit),
+            lighting,
             constant: Bindings::new(),
             buffers,
         };
@@ -374,7 +392,20 @@ impl Scene {
             height: self.resolution[1],
             offset: [0.0, 0.0],
             grid: 1,
+            shot: Shot {
+                direction,
+                distance,
+                draw,
+            },
         }
+    }
+
+    /// What lights a frame of this scene in a deferred scene: made for the coverage that its fragments are of.
+    pub fn lit(&self, frame: &Frame, coverage: &Coverage) -> Option<Lit> {
+        let lighting = self.lighting.as_ref()?;
+        let pose = self.pose(frame.shot.direction, frame.shot.distance);
+        let screen = lighting.frame(frame, &pose, &self.sphere);
+        Some(Lit::new(&lighting.lighting, screen, coverage))
     }
 
     fn pose(&self, direction: DVec3, distance: f64) -> Pose {

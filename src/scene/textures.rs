@@ -618,7 +618,7 @@ impl Reader<'_> {
 }
 
 /// Whether a texture's name says that it holds colours for the eye.
-fn is_colour(name: &str) -> bool {
+pub(super) fn is_colour(name: &str) -> bool {
     let words = words(name);
     let any = |list: &[&str]| words.iter().any(|w| list.contains(&w.as_str()));
     let colour = any(&[

@@ -2,7 +2,7 @@
 
 use super::error::{FrameError, Reference, TILE, Tally, displayed, encoded};
 use super::samples::Stand;
-use crate::eval::draw::{Shading, each_visible, resolve, seen, shade_into};
+use crate::eval::draw::{Lit, Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
@@ -35,6 +35,8 @@ pub(super) struct Rasterised {
 /// A frame rasterised at one offset.
 pub(super) struct Drawing {
     pub(super) coverage: Coverage,
+    /// What lights it, in a deferred scene.
+    lit: Option<Lit>,
     /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
     pub(super) seen: Option<Coverage>,
     /// For each covered fragment, its place in the reference.
@@ -51,16 +53,16 @@ impl Rasterised {
         offsets: &[[f32; 2]],
         (part, seed): (Part, u64),
     ) -> Self {
-        let mut fine = frame;
+        let at = |offset: [f32; 2], grid: u32| Frame {
+            offset,
+            grid,
+            ..frame.clone()
+        };
         let mut coverages: Vec<Coverage> = offsets
             .iter()
-            .map(|offset| {
-                fine.offset = *offset;
-                rasterize(stand.vertex, original, &fine)
-            })
+            .map(|offset| rasterize(stand.vertex, original, &at(*offset, 1)))
             .collect();
-        fine.offset = [0.0; 2];
-        fine.grid = GRID;
+        let fine = at([0.0; 2], GRID);
         let mut reference = rasterize(stand.vertex, original, &fine);
         let mut squares: Vec<_> = coverages.iter().flat_map(Coverage::squares).collect();
         squares.extend(reference.squares());
@@ -80,12 +82,18 @@ impl Rasterised {
             reference = part(&reference);
         }
         let output = stand.scene.output;
+        let mut shading = Shading::default();
+        let lit = stand.scene.lit(&fine, &reference);
         let bindings = fine.bindings;
-        let (reference, pixels) =
-            draw_reference(original, &reference, &coverages, &bindings, output);
+        shade(lit.as_ref(), original, &reference, &bindings, &mut shading);
+        let (reference, pixels) = reference_of(&reference, &shading, &coverages, output);
         let drawings = coverages
             .into_iter()
-            .map(|coverage| Drawing::new(original, coverage, &pixels, &bindings))
+            .zip(offsets)
+            .map(|(coverage, offset)| {
+                let lit = stand.scene.lit(&at(*offset, 1), &coverage);
+                Drawing::new(original, coverage, lit, &pixels, &bindings)
+            })
             .collect();
         Self {
             view,
@@ -110,7 +118,7 @@ impl Rasterised {
         let mut profile: Option<Profile> = None;
         let mut tally = Tally::new(&self.reference);
         for drawing in &self.drawings {
-            shade_into(program, &drawing.coverage, &self.bindings, &mut shading);
+            drawing.shade(program, &self.bindings, &mut shading);
             tally.add(&drawing.colours(&shading, self.reference.len(), output));
             match &mut profile {
                 Some(profile) => profile.absorb(&shading.profile),
@@ -131,23 +139,34 @@ impl Rasterised {
             return (0.0, 0);
         };
         let mut shading = Shading::default();
-        shade_into(program, &drawing.coverage, &self.bindings, &mut shading);
+        drawing.shade(program, &self.bindings, &mut shading);
         let colours = drawing.colours(&shading, self.reference.len(), output);
         self.reference.flip(&colours, pixels_per_degree)
     }
 }
 
-/// The pixels that the reference or a fragment covers, and the place of each in the picture, `y * width + x`, sorted.
-fn draw_reference(
-    original: &Program,
-    fine: &Coverage,
-    coverages: &[Coverage],
+/// Shades, and lights what was shaded where something lights it.
+fn shade(
+    lit: Option<&Lit>,
+    program: &Program,
+    coverage: &Coverage,
     bindings: &Bindings,
+    shading: &mut Shading,
+) {
+    match lit {
+        Some(lit) => lit.shade_into(program, coverage, bindings, shading),
+        None => shade_into(program, coverage, bindings, shading),
+    }
+}
+
+/// The pixels that the reference or a fragment covers, and the place of each in the picture, `y * width + x`, sorted.
+fn reference_of(
+    fine: &Coverage,
+    shading: &Shading,
+    coverages: &[Coverage],
     output: Output,
 ) -> (Reference, Vec<u32>) {
-    let mut shading = Shading::default();
-    shade_into(original, fine, bindings, &mut shading);
-    let mut picture = resolve(fine, &shading);
+    let mut picture = resolve(fine, shading);
     for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
         if *covered > 0.0 {
             let [r, g, b] = displayed(output, *colour);
@@ -172,7 +191,13 @@ fn draw_reference(
 }
 
 impl Drawing {
-    fn new(original: &Program, coverage: Coverage, pixels: &[u32], bindings: &Bindings) -> Self {
+    fn new(
+        original: &Program,
+        coverage: Coverage,
+        lit: Option<Lit>,
+        pixels: &[u32],
+        bindings: &Bindings,
+    ) -> Self {
         let mut places = vec![0; coverage.fragments];
         for (place, pixel) in places.iter_mut().zip(coverage.pixels()) {
             // Every covered pixel is among them.
@@ -185,8 +210,20 @@ impl Drawing {
                 seen(&coverage, &shading)
             }),
             places,
+            lit,
             coverage,
         }
+    }
+
+    /// Shades what is drawn, and lights it in a deferred scene: the colours are those that are seen.
+    pub(super) fn shade(&self, program: &Program, bindings: &Bindings, shading: &mut Shading) {
+        shade(
+            self.lit.as_ref(),
+            program,
+            &self.coverage,
+            bindings,
+            shading,
+        );
     }
 
     /// What a display shows at each pixel of the reference.
@@ -222,4 +259,57 @@ fn choose(all: &[(u32, u32)], count: usize, seed: u64) -> BTreeSet<(u32, u32)> {
         .take(count)
         .map(|(_, square)| square)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::compile::normal_form;
+    use crate::eval::program::Program;
+    use crate::front::Source;
+    use crate::scene::Scene;
+    use crate::search::{SampleSet, Samples, Stand};
+    use lodc_passes::{PASSES, Stage};
+    use std::path::Path;
+
+    #[test]
+    fn what_the_lighting_does_not_read_costs_no_error() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let source = Source::read(&folder.join("gbuffer.wgsl")).unwrap();
+        let path = folder.join("gbuffer.toml");
+        let scene = std::fs::read_to_string(&path).unwrap();
+        let scene = format!("resolution = [32, 32]\n{scene}");
+        let scene = Scene::resolve(&source, Some((&path, &scene))).unwrap();
+        let base = normal_form(&source).unwrap();
+        let vertex = base.index(Stage::Vertex).unwrap();
+        let vertex = Program::compile(base.module(), vertex, &[]).unwrap();
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let set = SampleSet::new(&stand, scene.distances[1], Samples::Full).unwrap();
+        let facts = set.facts(&base);
+        let (mut free, mut seen) = (0, 0);
+        for pass in PASSES {
+            for candidate in pass.candidates(&base, &facts) {
+                let site = candidate.site.path();
+                let unread =
+                    site.starts_with("fs_main.velocity") || site.starts_with("fs_main.along");
+                let albedo = site.starts_with("fs_main.painted");
+                if !unread && !albedo {
+                    continue;
+                }
+                let variant = pass.apply(&base, &candidate);
+                let error = set.measure(&variant).unwrap().error;
+                let floor = set.original().error;
+                if unread {
+                    assert_eq!(error, floor, "{candidate}");
+                    free += 1;
+                } else if error != floor {
+                    seen += 1;
+                }
+            }
+        }
+        assert!(free > 2 && seen > 0, "{free} {seen}");
+    }
 }

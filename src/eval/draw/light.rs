@@ -14,17 +14,64 @@ use crate::eval::machine::{Bindings, Resource};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::eval::texture::{Dimension, Texture};
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 
 /// A full-screen shader and what it reads of a material.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Lighting {
-    /// Its vertex stage.
-    pub vertex: Arc<Program>,
-    /// Its fragment stage; the picture is its colour at location 0.
-    pub fragment: Arc<Program>,
-    /// The textures that hold what the material wrote: group, binding, and what.
-    pub reads: Vec<((u32, u32), Plane)>,
+    vertex: Program,
+    fragment: Program,
+    reads: Vec<((u32, u32), Plane)>,
+    /// Clear images of each size that are not in use: one texture for each of `reads`. Most of an image is never
+    /// written to, so that making it anew would cost more than lighting some of its pixels.
+    spare: Mutex<BTreeMap<[u32; 2], Vec<GBuffer>>>,
+}
+
+/// A texture for each of a lighting's reads.
+type GBuffer = Vec<Arc<Texture>>;
+
+/// Pixels of the largest images that are kept for another use; a reference's are larger, and drawn once.
+const KEPT: usize = 1 << 19;
+
+impl Lighting {
+    /// A vertex and a fragment program, whose picture is the colour at location 0, and the textures that hold what
+    /// the material wrote: group, binding, and what.
+    pub fn new(vertex: Program, fragment: Program, reads: Vec<((u32, u32), Plane)>) -> Self {
+        Self {
+            vertex,
+            fragment,
+            reads,
+            spare: Mutex::default(),
+        }
+    }
+
+    /// Images in which nothing is drawn.
+    fn clear(&self, [width, height]: [u32; 2]) -> GBuffer {
+        let spare = self.spare.lock().ok().and_then(|mut spare| {
+            let images = spare.get_mut(&[width, height])?;
+            images.pop()
+        });
+        let texture = |(_, plane): &(_, Plane)| {
+            let image = Image {
+                width,
+                height,
+                texels: vec![plane.cleared(); width as usize * height as usize],
+            };
+            let texture = Texture::new(Dimension::D2, vec![image]);
+            Arc::new(texture.expect("one image that is not empty is a texture"))
+        };
+        spare.unwrap_or_else(|| self.reads.iter().map(texture).collect())
+    }
+
+    /// Takes images back that are clear again.
+    fn keep(&self, size: [u32; 2], images: GBuffer) {
+        if size[0] as usize * size[1] as usize <= KEPT
+            && let Ok(mut spare) = self.spare.lock()
+        {
+            spare.entry(size).or_default().push(images);
+        }
+    }
 }
 
 /// One image of a G-buffer.
@@ -36,15 +83,29 @@ pub enum Plane {
     Depth,
 }
 
+impl Plane {
+    /// What it holds where nothing is drawn.
+    fn cleared(self) -> [f32; 4] {
+        match self {
+            Self::Target(_, format) => format.store([0.0; 4]),
+            Self::Depth => [1.0, 0.0, 0.0, 1.0],
+        }
+    }
+}
+
 /// The lighting of one frame, made ready: which fragments of the screen are lit.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Lit {
     lighting: Arc<Lighting>,
     /// What the lighting reads besides the G-buffer.
     bindings: Bindings,
     screen: Coverage,
-    /// For each fragment of the material, the fragment of the screen that lights it.
-    places: Vec<Option<u32>>,
+    /// The pixels that the material may cover, sorted.
+    pixels: Vec<u32>,
+    /// For each fragment of the material, its pixel's place in `pixels`.
+    places: Vec<u32>,
+    /// For each of `pixels`, the fragment of the screen that lights it.
+    lights: Vec<Option<u32>>,
     /// The depth of each fragment of the material.
     depths: Vec<f32>,
     /// The locations that are read.
@@ -64,21 +125,23 @@ impl Lit {
             (material.width, material.height),
             "the lighting has a pixel for each fine pixel"
         );
-        let squares = |pixel: u32| {
-            let (x, y) = (pixel % screen.width / 2, pixel / screen.width / 2);
-            (y * screen.width.div_ceil(2) + x) as usize
-        };
-        let count = screen.width.div_ceil(2) as usize * screen.height.div_ceil(2) as usize;
-        let mut wanted = vec![false; count];
-        for pixel in material.pixels() {
-            wanted[squares(pixel)] = true;
-        }
-        let screen = screen.part(|(x, y)| wanted[(y * screen.width.div_ceil(2) + x) as usize]);
-        let mut lights = vec![None; screen.width as usize * screen.height as usize];
+        let mut pixels: Vec<u32> = material.pixels().collect();
+        pixels.sort_unstable();
+        pixels.dedup();
+        let square = |pixel: u32| (pixel % screen.width / 2, pixel / screen.width / 2);
+        let mut squares: Vec<(u32, u32)> = pixels.iter().map(|pixel| square(*pixel)).collect();
+        squares.sort_unstable();
+        let screen = screen.part(|square| squares.binary_search(&square).is_ok());
+        let place = |pixel: u32| pixels.binary_search(&pixel).ok();
+        let mut lights = vec![None; pixels.len()];
         for (fragment, pixel) in (0..).zip(screen.pixels()) {
-            // Two triangles cover a pixel twice where a stage draws more than the screen; both show the same.
-            lights[pixel as usize].get_or_insert(fragment);
+            if let Some(place) = place(pixel) {
+                // A stage that draws more than the screen may cover a pixel twice; both show the same.
+                lights[place].get_or_insert(fragment);
+            }
         }
+        // Every pixel of the material is among them.
+        let places = material.pixels().map(|p| place(p).unwrap_or(0) as u32);
         let locations = lighting.reads.iter().filter_map(|(_, plane)| match plane {
             Plane::Target(location, _) => Some(*location),
             Plane::Depth => None,
@@ -90,11 +153,13 @@ impl Lit {
         let depths = blocks.flat_map(|block| block.covered.lanes().map(|lane| block.depths[lane]));
         Self {
             bindings: frame.bindings,
-            places: material.pixels().map(|p| lights[p as usize]).collect(),
+            places: places.collect(),
+            lights,
             depths: depths.collect(),
             locations,
             lighting: lighting.clone(),
             screen,
+            pixels,
         }
     }
 
@@ -112,79 +177,81 @@ impl Lit {
         shading: &mut Shading,
     ) {
         shade_targets(material, coverage, bindings, &self.locations, shading);
+        let seen = self.seen(coverage, shading);
+        let size = [coverage.width, coverage.height];
+        let mut images = self.lighting.clear(size);
+        for ((_, plane), image) in self.lighting.reads.iter().zip(&mut images) {
+            self.draw(*plane, &seen, shading, image);
+        }
         let mut lit_bindings = self.bindings.clone();
-        for ((at, _), texture) in self
-            .lighting
-            .reads
-            .iter()
-            .zip(self.planes(coverage, shading))
-        {
-            lit_bindings.insert(*at, Resource::Texture(Arc::new(texture)));
+        for ((at, _), image) in self.lighting.reads.iter().zip(&images) {
+            lit_bindings.insert(*at, Resource::Texture(image.clone()));
         }
         let mut lit = Shading::default();
-        shade_into(
-            &self.lighting.fragment,
-            &self.screen,
-            &lit_bindings,
-            &mut lit,
-        );
+        let fragment = &self.lighting.fragment;
+        shade_into(fragment, &self.screen, &lit_bindings, &mut lit);
+        drop(lit_bindings);
+        for ((_, plane), image) in self.lighting.reads.iter().zip(&mut images) {
+            self.write(image, |_| plane.cleared());
+        }
+        self.lighting.keep(size, images);
         for (fragment, place) in self.places.iter().enumerate() {
-            match place
-                .map(|place| place as usize)
-                .filter(|place| lit.alive[*place])
-            {
-                Some(place) => shading.colours[fragment] = lit.colours[place],
+            let light = self.lights[*place as usize].map(|light| light as usize);
+            match light.filter(|light| lit.alive[*light]) {
+                Some(light) => shading.colours[fragment] = lit.colours[light],
                 None => shading.alive[fragment] = false,
             }
         }
     }
 
-    /// The images that the lighting reads, of the fragments that are seen.
-    fn planes(&self, coverage: &Coverage, shading: &Shading) -> Vec<Texture> {
-        let pixels = coverage.width as usize * coverage.height as usize;
-        let mut nearest = vec![None; pixels];
+    /// The fragment that is seen at each of the pixels.
+    fn seen(&self, coverage: &Coverage, shading: &Shading) -> Vec<Option<usize>> {
+        let mut seen = vec![None; self.pixels.len()];
         each_visible(
             coverage,
             shading,
-            pixels,
-            |_, pixel| pixel,
-            |pixel, fragment| nearest[pixel as usize] = Some(fragment),
+            self.pixels.len(),
+            |fragment, _| self.places[fragment],
+            |place, fragment| seen[place as usize] = Some(fragment),
         );
-        let reads = self.lighting.reads.iter();
-        let image = |plane: &Plane| -> Vec<[f32; 4]> {
-            let seen = nearest.iter();
-            match *plane {
-                Plane::Depth => {
-                    let depth = |&fragment: &usize| {
-                        let own = shading.depths.get(fragment);
-                        // Clamped to the viewport's range; NaN is 0.
-                        own.unwrap_or(&self.depths[fragment]).max(0.0).min(1.0)
-                    };
-                    seen.map(|fragment| [fragment.as_ref().map_or(1.0, depth), 0.0, 0.0, 1.0])
-                        .collect()
+        seen
+    }
+
+    /// Draws what is seen into an image.
+    fn draw(
+        &self,
+        plane: Plane,
+        seen: &[Option<usize>],
+        shading: &Shading,
+        image: &mut Arc<Texture>,
+    ) {
+        match plane {
+            Plane::Depth => self.write(image, |place| match seen[place] {
+                Some(fragment) => {
+                    let own = shading.depths.get(fragment);
+                    let depth = own.unwrap_or(&self.depths[fragment]);
+                    // Clamped to the viewport's range; NaN is 0.
+                    [depth.max(0.0).min(1.0), 0.0, 0.0, 1.0]
                 }
-                Plane::Target(location, format) => {
-                    let target = self.locations.iter().position(|have| *have == location);
-                    let values = target.and_then(|target| shading.targets.get(target));
-                    let stored = |&fragment: &usize| {
-                        values.map_or([0.0; 4], |values| format.store(values[fragment]))
-                    };
-                    let cleared = format.store([0.0; 4]);
-                    seen.map(|fragment| fragment.as_ref().map_or(cleared, stored))
-                        .collect()
-                }
+                None => plane.cleared(),
+            }),
+            Plane::Target(location, format) => {
+                let target = self.locations.iter().position(|have| *have == location);
+                let values = target.and_then(|target| shading.targets.get(target));
+                self.write(image, |place| match (seen[place], values) {
+                    (Some(fragment), Some(values)) => format.store(values[fragment]),
+                    _ => plane.cleared(),
+                });
             }
-        };
-        let texture = |(_, plane): &(_, Plane)| {
-            let image = Image {
-                width: coverage.width,
-                height: coverage.height,
-                texels: image(plane),
-            };
-            Texture::new(Dimension::D2, vec![image])
-                .expect("one image that is not empty is a texture")
-        };
-        reads.map(texture).collect()
+        }
+    }
+
+    /// Writes each of the pixels of an image, by its place.
+    fn write(&self, image: &mut Arc<Texture>, texel: impl Fn(usize) -> [f32; 4]) {
+        let texels = Arc::make_mut(image).texels_mut();
+        for (place, pixel) in self.pixels.iter().enumerate() {
+            texels[*pixel as usize] = texel(place);
+        }
     }
 }
 
@@ -195,7 +262,6 @@ mod tests {
     use crate::eval::raster::Attribute;
     use crate::scene::mesh::Mesh;
     use crate::scene::objects::Object;
-    use std::collections::BTreeMap;
 
     const SHADERS: &str = "
 struct Varyings { @builtin(position) position: vec4f, @location(0) uv: vec2f }
@@ -228,13 +294,13 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
     return vec4f(dpdxFine(here), in.uv * vec2f(textureDimensions(normal)), 1.0);
 }";
 
-    fn program(entry: &str) -> Arc<Program> {
+    fn program(entry: &str) -> Program {
         let module = naga::front::wgsl::parse_str(SHADERS).unwrap();
         naga::valid::Validator::new(Default::default(), naga::valid::Capabilities::all())
             .validate(&module)
             .unwrap();
         let entry = module.entry_points.iter().position(|e| e.name == entry);
-        Arc::new(Program::compile(&module, entry.unwrap(), &[]).unwrap())
+        Program::compile(&module, entry.unwrap(), &[]).unwrap()
     }
 
     fn frame(mesh: Mesh, size: u32, grid: u32) -> Frame {
@@ -246,6 +312,7 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
             height: size,
             offset: [0.0; 2],
             grid,
+            shot: Default::default(),
         }
     }
 
@@ -261,15 +328,12 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
     /// The lit material in 8 x 8 pixels of so many fine ones, as its coverage and its shading.
     fn lit(fragment: &str, grid: u32) -> (Coverage, Shading) {
         let target = |location, name| Plane::Target(location, Format::of_name(name).unwrap());
-        let lighting = Arc::new(Lighting {
-            vertex: program("screen"),
-            fragment: program(fragment),
-            reads: vec![
-                ((0, 0), target(0, "rgba8unorm")),
-                ((0, 1), target(2, "rg16float")),
-                ((0, 2), Plane::Depth),
-            ],
-        });
+        let reads = vec![
+            ((0, 0), target(0, "rgba8unorm")),
+            ((0, 1), target(2, "rg16float")),
+            ((0, 2), Plane::Depth),
+        ];
+        let lighting = Arc::new(Lighting::new(program("screen"), program(fragment), reads));
         let material = program("material");
         let drawn = frame(half(), 8, grid);
         let coverage = rasterize(&program("vertex"), &material, &drawn);
@@ -277,6 +341,10 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
         let lit = Lit::new(&lighting, screen, &coverage);
         let mut shading = Shading::default();
         lit.shade_into(&material, &coverage, &drawn.bindings, &mut shading);
+        let first = shading.clone();
+        // Into the same images again.
+        lit.shade_into(&material, &coverage, &drawn.bindings, &mut shading);
+        assert_eq!(first, shading);
         assert_eq!(
             shading.profile.lanes,
             shade(&material, &coverage, &drawn.bindings).profile.lanes

@@ -15,6 +15,7 @@ use super::program::{Program, Slot};
 use super::raster::{Block, Coverage, Frame, rasterize};
 use naga::{Binding, BuiltIn, ScalarKind};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Blocks that one machine runs. Profiles are summed machine by machine, so this is part of the result's
 /// bits; the number of threads is not.
@@ -26,7 +27,7 @@ pub struct Shading {
     /// For each covered fragment of the coverage, in its order, the colour at location 0. Components
     /// that the program does not return are 0, alpha 1; integers are converted.
     pub colours: Vec<[f32; 4]>,
-    /// The same for further locations that were asked for, in their order.
+    /// The same for further locations, where they were asked for, in their order.
     pub targets: Vec<Vec<[f32; 4]>>,
     /// For each covered fragment, whether it was kept (not discarded, and its sample mask not 0).
     pub alive: Vec<bool>,
@@ -36,7 +37,7 @@ pub struct Shading {
     pub profile: Profile,
 }
 
-/// Shades every fragment, in parallel; the result does not depend on the number of threads.
+/// Shades every fragment, in parallel, with all colours that the program returns; the result does not depend on the number of threads.
 ///
 /// Inputs are matched by location or built-in and component, so a program may read less than the one that
 /// the coverage was made for; what the coverage does not have is 0.
@@ -45,11 +46,20 @@ pub struct Shading {
 /// When a resource of the program is not bound.
 pub fn shade(fragment: &Program, coverage: &Coverage, bindings: &Bindings) -> Shading {
     let mut shading = Shading::default();
-    shade_into(fragment, coverage, bindings, &mut shading);
+    let further = fragment
+        .outputs()
+        .iter()
+        .filter_map(|slot| match slot.binding {
+            Binding::Location { location, .. } if location > 0 => Some(location),
+            _ => None,
+        });
+    let further: BTreeSet<u32> = further.collect();
+    let further: Vec<u32> = further.into_iter().collect();
+    shade_targets(fragment, coverage, bindings, &further, &mut shading);
     shading
 }
 
-/// The same into a shading that is used again, so that nothing is allocated for its fragments.
+/// The same of location 0 alone, into a shading that is used again, so that nothing is allocated for its fragments.
 ///
 /// # Panics
 /// When a resource of the program is not bound.

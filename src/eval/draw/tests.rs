@@ -175,6 +175,7 @@ fn frame(mesh: Mesh, size: u32, image: Image) -> Frame {
         height: size,
         offset: [0.0; 2],
         grid: 1,
+        shot: Default::default(),
     }
 }
 

@@ -15,6 +15,8 @@ mod registers;
 mod simplify;
 mod uniform;
 
+use crate::Diagnostic;
+use crate::front::Source;
 use lodc_passes::Work;
 use naga::{
     Binding, Expression, FunctionArgument, FunctionResult, Handle, Interpolation, Module,
@@ -57,6 +59,21 @@ pub struct Refused {
     pub what: String,
     /// Where, in the text that the module was parsed from.
     pub span: Span,
+}
+
+impl Refused {
+    /// The same as a message at its place in the source that was compiled.
+    pub fn at(&self, source: &Source) -> Box<Diagnostic> {
+        source
+            .error(
+                format!("lodc cannot evaluate {}", self.what),
+                self.span,
+                "here",
+            )
+            .with_note(
+                "errors are measured by running the shader on the CPU, which does not do this",
+            )
+    }
 }
 
 impl Program {

@@ -20,6 +20,7 @@ mod vertices;
 use super::lane::{LANES, Mask, Words};
 use super::machine::{Bindings, Profile};
 use super::program::{Program, Slot};
+use crate::scene::camera::Shot;
 use crate::scene::mesh::Mesh;
 use naga::{Binding, BuiltIn};
 use std::collections::BTreeMap;
@@ -70,6 +71,8 @@ pub struct Frame {
     /// How many fine pixels a pixel has along each axis: 1 to draw, 4 for the reference.
     /// Derivatives are those between fine pixels.
     pub grid: u32,
+    /// What it is a picture of.
+    pub shot: Shot,
 }
 
 /// What a frame shows before it is shaded: fragments in a fixed order, with the inputs of the fragment program.

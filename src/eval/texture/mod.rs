@@ -181,6 +181,11 @@ impl Texture {
         .with_mip_chain()
     }
 
+    /// The texels of the finest level, to be written.
+    pub(crate) fn texels_mut(&mut self) -> &mut [[f32; 4]] {
+        &mut self.levels[0].texels
+    }
+
     /// Its shape.
     pub fn dimension(&self) -> Dimension {
         self.dimension

@@ -32,12 +32,18 @@ pub enum Variation {
 }
 
 /// Which of their values the sampled parts take in a picture.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Draw {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Draw {
     /// Each its i-th, and round again.
     Listed(usize),
     /// Any of their ranges, by chance, told by a seed.
     Chance(u64),
+}
+
+impl Default for Draw {
+    fn default() -> Self {
+        Self::Listed(0)
+    }
 }
 
 /// Where a part of a buffer gets its numbers from, column by column.
