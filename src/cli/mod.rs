@@ -38,7 +38,7 @@ enum Command {
 /// What every command reads.
 #[derive(Debug, Args)]
 struct InputArgs {
-    /// The material shader, WGSL
+    /// The material shader: WGSL, or a GLSL fragment shader
     #[arg(required = true)]
     shader: Option<PathBuf>,
     /// The scene that errors are measured over [default: the shader's name with .toml, if it is there]

@@ -98,7 +98,13 @@ fn declared_outside(source: &Source, name: &str) -> Option<Span> {
             return None;
         }
         let place = source.place(module.global_variables.get_span(handle))?;
-        let at = whole_word(place.file.text, place.range, name)?;
+        let text = place.file.text;
+        // The span of a block is its name, before its members.
+        let end = match text[place.range.end..].find('}') {
+            Some(end) if in_block() => place.range.end + end,
+            _ => place.range.end,
+        };
+        let at = whole_word(text, place.range.start..end, name)?;
         Some(place.file.span(at))
     })
 }

@@ -317,11 +317,7 @@ fn foreign_directive(name: &str, text: &str) -> Option<Box<Diagnostic>> {
     None
 }
 
-pub(super) fn at(
-    diagnostic: Box<Diagnostic>,
-    span: Span,
-    remark: impl Into<String>,
-) -> Box<Diagnostic> {
+fn at(diagnostic: Box<Diagnostic>, span: Span, remark: impl Into<String>) -> Box<Diagnostic> {
     match span.to_range() {
         Some(range) => diagnostic.with_label(range, remark),
         None => diagnostic,

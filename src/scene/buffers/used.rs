@@ -38,11 +38,15 @@ impl Used {
                     mentions.insert(pointer, 0);
                 }
             }
-            for (_, expression) in function.expressions.iter() {
+            for (place, expression) in function.expressions.iter() {
                 if let Expression::AccessIndex { base, index } = expression
                     && let Some(parts) = mentions.get_mut(base)
                 {
                     *parts += 1;
+                    // naga's reader of GLSL names every member of a block, asked for or not.
+                    if info[place].ref_count == 0 {
+                        continue;
+                    }
                     let name = members.get(*index as usize).and_then(|m| m.name.clone());
                     names.extend(name);
                 }
@@ -107,5 +111,19 @@ mod tests {
         .unwrap();
         let (handle, _) = whole.module.global_variables.iter().next().unwrap();
         assert_eq!(Used::of(&whole, handle), Used::All);
+    }
+
+    #[test]
+    fn members_of_a_glsl_block_without_an_instance_are_read_where_they_are_named() {
+        let text = "#version 450
+            layout(location = 0) out vec4 colour;
+            layout(std140, binding = 0) uniform S { float a; float gloss; float unused; };
+            float f() { return a; }
+            void main() { colour = vec4(f() + gloss); }";
+        let source = Source::parse("a.frag", text).unwrap();
+        let mut variables = source.module.global_variables.iter();
+        let (handle, _) = variables.find(|(_, v)| v.binding.is_some()).unwrap();
+        let names = ["a", "gloss"].map(str::to_owned).into();
+        assert_eq!(Used::of(&source, handle), Used::Members(names));
     }
 }
