@@ -72,9 +72,39 @@ pub fn summary(report: &Report) -> String {
     out.push('\n');
     out.push_str(&table(report));
     out.push_str(
-        "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n\n",
+        "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n",
     );
+    out.push_str(&held_out(report));
+    if report.bound == "paper" {
+        out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
+    }
+    for what in &report.left_out {
+        let _ = writeln!(out, "  left out: {what}");
+    }
+    out.push('\n');
     out
+}
+
+/// The errors of the levels on pictures that decided nothing; nothing where there is no level.
+fn held_out(report: &Report) -> String {
+    let errors: Vec<String> = report
+        .levels
+        .iter()
+        .filter_map(|level| {
+            let rmse = format!("{:.3}", level.error.held_out_rmse?);
+            Some(match level.error.held_out_standard_error {
+                Some(chance) => format!("{rmse} +- {chance:.3}"),
+                None => rmse,
+            })
+        })
+        .collect();
+    if errors.is_empty() {
+        return String::new();
+    }
+    format!(
+        "  error on pictures that the search has not seen: {}\n",
+        errors.join(", ")
+    )
 }
 
 /// What to do next, after the files have been written.
