@@ -1,4 +1,4 @@
-//! Pictures and images: sRGB encoding, box filter, PNG files.
+//! Pictures and images: sRGB encoding, box filter, PNG and JPEG files.
 //!
 //! All arithmetic is addition, multiplication, division and square root in a fixed order, so that the
 //! same bits come out everywhere.
@@ -7,6 +7,10 @@ use crate::{Diagnostic, Result};
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::LazyLock;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
 
 /// The longest edge of an image that is read, in pixels: what WebGPU promises for textures.
 pub const MAX_EDGE: u32 = 8192;
@@ -108,6 +112,101 @@ pub fn to_byte(value: f32) -> u8 {
     (value * 255.0 + 0.5) as u8
 }
 
+/// Decodes an image file, PNG or JPEG, told from its first bytes; `name` is the file's.
+///
+/// # Errors
+/// When it is neither, is damaged, or an edge is longer than [`MAX_EDGE`].
+pub fn decode(name: &str, bytes: &[u8], space: Space) -> Result<Image> {
+    let kind = match bytes {
+        [0xff, 0xd8, 0xff, ..] => return decode_jpeg(name, bytes, space),
+        [0x89, b'P', b'N', b'G', ..] => return decode_png(name, bytes, space),
+        [0xab, b'K', b'T', b'X', ..] => "a KTX texture",
+        [
+            b'R',
+            b'I',
+            b'F',
+            b'F',
+            _,
+            _,
+            _,
+            _,
+            b'W',
+            b'E',
+            b'B',
+            b'P',
+            ..,
+        ] => "a WebP image",
+        [b'D', b'D', b'S', b' ', ..] => "a DDS texture",
+        [b'G', b'I', b'F', b'8', ..] => "a GIF image",
+        [0x76, 0x2f, 0x31, 0x01, ..] => "an OpenEXR image",
+        [b'#', b'?', ..] => "a Radiance image",
+        // The PNG reader says what is wrong with anything else.
+        _ => return decode_png(name, bytes, space),
+    };
+    Err(
+        Diagnostic::error(format!("cannot read the image `{name}`: it is {kind}"))
+            .with_note("images are PNG or JPEG files: convert this one"),
+    )
+}
+
+/// Decodes a JPEG file, baseline or progressive; alpha is 1. Vector instructions are left alone, so that the bits
+/// are the same on every machine.
+///
+/// # Errors
+/// As [`decode_png`].
+pub fn decode_jpeg(name: &str, bytes: &[u8], space: Space) -> Result<Image> {
+    let refuse = |why: String| {
+        Diagnostic::error(format!("cannot read the image `{name}`: {why}"))
+            .with_note("images are PNG or JPEG files; convert or export this one again")
+    };
+    let failed =
+        |e: zune_jpeg::errors::DecodeErrors| refuse(e.to_string().trim_end_matches('.').to_owned());
+    let options = DecoderOptions::default()
+        .set_use_unsafe(false)
+        .set_strict_mode(true)
+        // Checked here, with a message of our own.
+        .set_max_width(usize::from(u16::MAX))
+        .set_max_height(usize::from(u16::MAX))
+        .jpeg_set_out_colorspace(ColorSpace::RGB);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(failed)?;
+    let (width, height) = match decoder.info() {
+        Some(info) => (u32::from(info.width), u32::from(info.height)),
+        None => return Err(refuse("it has no size".to_owned())),
+    };
+    if width > MAX_EDGE || height > MAX_EDGE {
+        return Err(too_large(name, width, height));
+    }
+    let pixels = decoder.decode().map_err(failed)?;
+    let count = width as usize * height as usize;
+    if pixels.len() != 3 * count {
+        return Err(refuse(
+            "its colours are neither grey nor red, green and blue".to_owned(),
+        ));
+    }
+    let value = |byte: u8| match space {
+        Space::Integer => f32::from(byte),
+        Space::Srgb => srgb_byte(byte),
+        Space::Linear => f32::from(byte) / 255.0,
+    };
+    let alpha = if space == Space::Integer { 255.0 } else { 1.0 };
+    Ok(Image {
+        width,
+        height,
+        texels: pixels
+            .chunks_exact(3)
+            .map(|rgb| [value(rgb[0]), value(rgb[1]), value(rgb[2]), alpha])
+            .collect(),
+    })
+}
+
+fn too_large(name: &str, width: u32, height: u32) -> Box<Diagnostic> {
+    Diagnostic::error(format!(
+        "cannot read the image `{name}`: it has {width} x {height} pixels, and at most {MAX_EDGE} x {MAX_EDGE} are read"
+    ))
+    .with_note("make it smaller: levels of detail are for distances at which it is not seen")
+}
+
 /// Reads a PNG file.
 ///
 /// # Errors
@@ -129,16 +228,14 @@ pub fn read_png(path: &Path, space: Space) -> Result<Image> {
 pub fn decode_png(name: &str, bytes: &[u8], space: Space) -> Result<Image> {
     let refuse = |why: String| {
         Diagnostic::error(format!("cannot read the image `{name}`: {why}"))
-            .with_note("images are PNG files; convert or export this one again")
+            .with_note("images are PNG or JPEG files; convert or export this one again")
     };
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::ALPHA);
     let failed = |e: png::DecodingError| refuse(e.to_string().trim_end_matches('.').to_string());
     let (width, height) = decoder.read_header_info().map_err(failed)?.size();
     if width > MAX_EDGE || height > MAX_EDGE {
-        return Err(refuse(format!(
-            "it has {width} x {height} pixels, and at most {MAX_EDGE} x {MAX_EDGE} are read"
-        )));
+        return Err(too_large(name, width, height));
     }
     let mut reader = decoder.read_info().map_err(failed)?;
     let Some(size) = reader.output_buffer_size() else {
@@ -152,41 +249,49 @@ pub fn decode_png(name: &str, bytes: &[u8], space: Space) -> Result<Image> {
         png::ColorType::Rgba => false,
         other => return Err(refuse(format!("its colour type {other:?} did not expand"))),
     };
-    let spread = |texel: &[f32]| match *texel {
-        [grey, alpha] => [grey, grey, grey, alpha],
-        [r, g, b, a] => [r, g, b, a],
-        _ => [0.0; 4],
-    };
     let channels = if grey { 2 } else { 4 };
-    let values: Vec<f32> = match (frame.bit_depth, space) {
-        (png::BitDepth::Sixteen, _) => buffer
-            .chunks_exact(2)
-            .enumerate()
-            .map(|(i, bytes)| {
-                let value = u16::from_be_bytes([bytes[0], bytes[1]]);
-                match space {
-                    Space::Integer => f32::from(value),
-                    Space::Srgb if i % channels != channels - 1 => {
-                        srgb_exact(f64::from(value) / 65535.0) as f32
+    // Texels are made one by one: a buffer of all values beside them would double the peak.
+    let texel = |value: &dyn Fn(usize, bool) -> f32| match grey {
+        true => {
+            let grey = value(0, true);
+            [grey, grey, grey, value(1, false)]
+        }
+        false => [
+            value(0, true),
+            value(1, true),
+            value(2, true),
+            value(3, false),
+        ],
+    };
+    let texels = match frame.bit_depth {
+        png::BitDepth::Sixteen => buffer
+            .chunks_exact(2 * channels)
+            .map(|bytes| {
+                texel(&|i, colour| {
+                    let value = u16::from_be_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+                    match space {
+                        Space::Integer => f32::from(value),
+                        Space::Srgb if colour => srgb_exact(f64::from(value) / 65535.0) as f32,
+                        _ => f32::from(value) / 65535.0,
                     }
-                    _ => f32::from(value) / 65535.0,
-                }
+                })
             })
             .collect(),
         _ => buffer
-            .iter()
-            .enumerate()
-            .map(|(i, &byte)| match space {
-                Space::Integer => f32::from(byte),
-                Space::Srgb if i % channels != channels - 1 => srgb_byte(byte),
-                _ => f32::from(byte) / 255.0,
+            .chunks_exact(channels)
+            .map(|bytes| {
+                texel(&|i, colour| match space {
+                    Space::Integer => f32::from(bytes[i]),
+                    Space::Srgb if colour => srgb_byte(bytes[i]),
+                    _ => f32::from(bytes[i]) / 255.0,
+                })
             })
             .collect(),
     };
     Ok(Image {
         width: frame.width,
         height: frame.height,
-        texels: values.chunks_exact(channels).map(spread).collect(),
+        texels,
     })
 }
 
@@ -381,6 +486,33 @@ mod tests {
         assert!(error.message.contains("9000 x 1"), "{}", error.message);
         assert!(read_png(Path::new("/no/such/file.png"), Space::Linear).is_err());
         assert!(read_png(Path::new("/"), Space::Linear).is_err());
+    }
+
+    #[test]
+    fn jpegs_are_read_and_other_formats_named() {
+        // 8 x 8, one colour: what libjpeg makes of red 200, green 100, blue 50 at quality 95.
+        let jpeg = include_bytes!("../../testdata/images/orange.jpg");
+        let image = decode("orange.jpg", jpeg, Space::Integer).unwrap();
+        assert_eq!((image.width, image.height, image.texels.len()), (8, 8, 64));
+        for texel in &image.texels {
+            for (got, expected) in texel.iter().zip([200.0, 100.0, 50.0, 255.0]) {
+                assert!((got - expected).abs() <= 2.0, "{texel:?}");
+            }
+        }
+        let linear = decode("orange.jpg", jpeg, Space::Srgb).unwrap().texels[0][0];
+        assert_eq!(linear, srgb_byte(image.texels[0][0] as u8));
+        let error = decode("a.webp", b"RIFF\0\0\0\0WEBPVP8 ", Space::Srgb).unwrap_err();
+        assert_eq!(
+            error.message,
+            "cannot read the image `a.webp`: it is a WebP image"
+        );
+        assert!(decode("cut.jpg", &jpeg[..jpeg.len() / 2], Space::Srgb).is_err());
+        // A size bomb: the frame header says 65,535 x 65,535, and nothing of that size is made.
+        let mut bomb = jpeg.to_vec();
+        let frame = bomb.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
+        bomb[frame + 5..frame + 9].fill(0xff);
+        let error = decode("bomb.jpg", &bomb, Space::Srgb).unwrap_err();
+        assert!(error.message.contains("65535 x 65535"), "{error}");
     }
 
     #[test]

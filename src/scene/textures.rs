@@ -2,7 +2,7 @@
 
 use super::Inference;
 use super::file::{Entries, Node, Toml, suggest};
-use crate::eval::image::{Image, Space, decode_png};
+use crate::eval::image::{Image, Space, decode};
 use crate::eval::texture::{Comparison, Dimension, Sampler, Texture, Wrap};
 use crate::front::names::{listed, words};
 use crate::front::{Source, similar_file};
@@ -586,7 +586,7 @@ impl Reader<'_> {
                         span.clone(),
                         "",
                     )
-                    .with_note("name a PNG file in it");
+                    .with_note("name a PNG or JPEG file in it");
             }
             if error.kind() != std::io::ErrorKind::NotFound {
                 return toml.error(
@@ -612,7 +612,7 @@ impl Reader<'_> {
         if !inputs.iter().any(|(name, _)| name == file) {
             inputs.push((file.to_owned(), super::hash(&bytes)));
         }
-        decode_png(file, &bytes, space)
+        decode(file, &bytes, space)
             .map_err(|error| error.with_source(toml.name, toml.text).with_label(span, ""))
     }
 }
