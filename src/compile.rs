@@ -4,8 +4,12 @@
 //! [`crate::emit::write_atomically`].
 
 #[cfg(feature = "search")]
+mod init;
+#[cfg(feature = "search")]
 mod search;
 
+#[cfg(feature = "search")]
+pub use init::{InitRequest, init};
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect};
 

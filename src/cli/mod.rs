@@ -2,7 +2,7 @@
 
 mod progress;
 
-use crate::compile::{self, Request};
+use crate::compile::{self, InitRequest, Request};
 use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
@@ -33,17 +33,41 @@ struct Cli {
 enum Command {
     /// Lists every place that could be simplified, with its work and its candidates
     Inspect(InputArgs),
+    /// Writes the scene file, with everything that is inferred and why
+    Init(InitArgs),
+}
+
+#[derive(Debug, Args)]
+struct InitArgs {
+    #[command(flatten)]
+    shader: ShaderArgs,
+    /// The model that it is put on, glTF or GLB; or sphere, plane, cube, torus-knot, terrain
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// The scene to write [default: the shader's name with .toml, which lodc reads by itself]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Writes over a scene that is there already
+    #[arg(long)]
+    force: bool,
+}
+
+/// What the commands read that look at a shader in its scene.
+#[derive(Debug, Args)]
+struct InputArgs {
+    #[command(flatten)]
+    shader: ShaderArgs,
+    /// The scene that errors are measured over [default: the shader's name with .toml, if it is there]
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
 }
 
 /// What every command reads.
 #[derive(Debug, Args)]
-struct InputArgs {
+struct ShaderArgs {
     /// The material shader: WGSL, or a GLSL fragment shader
     #[arg(required = true)]
     shader: Option<PathBuf>,
-    /// The scene that errors are measured over [default: the shader's name with .toml, if it is there]
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
     /// The vertex entry point, where there are several
     #[arg(long, value_name = "NAME")]
     vertex: Option<String>,
@@ -97,6 +121,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let done = match cli.command {
         Some(Command::Inspect(input)) => inspect(input),
+        Some(Command::Init(arguments)) => init(arguments),
         None => compile_command(cli.compile),
     };
     match done {
@@ -120,6 +145,16 @@ fn print(text: &str) {
 
 impl InputArgs {
     fn request(self) -> Result<Request> {
+        let request = self.shader.request()?;
+        Ok(Request {
+            scene: self.scene,
+            ..request
+        })
+    }
+}
+
+impl ShaderArgs {
+    fn request(self) -> Result<Request> {
         let definitions = self.definitions.iter();
         let definitions = definitions.map(|text| Definition::of_text(text));
         Ok(Request {
@@ -129,7 +164,6 @@ impl InputArgs {
             },
             // The parser has asked for it.
             shader: self.shader.unwrap_or_default(),
-            scene: self.scene,
             stages: Stages {
                 vertex: self.vertex,
                 fragment: self.fragment,
@@ -146,6 +180,37 @@ fn reading(name: &str) -> std::result::Result<BoundReading, String> {
 
 fn inspect(input: InputArgs) -> Result<()> {
     print(&compile::inspect(&input.request()?)?);
+    Ok(())
+}
+
+fn init(arguments: InitArgs) -> Result<()> {
+    let read = arguments.shader.request()?;
+    let request = InitRequest {
+        shader: read.shader,
+        stages: read.stages,
+        modules: read.modules,
+        mesh: arguments.mesh,
+        output: arguments.output,
+        force: arguments.force,
+    };
+    let (files, made) = compile::init(&request)?;
+    for warning in &made.warnings {
+        print_diagnostic(warning);
+    }
+    write(&files, false)?;
+    for (i, (what, ty)) in made.missing.iter().enumerate() {
+        let title = if i == 0 { "to fill in" } else { "" };
+        print(&format!("  {title:<16}{what} ({ty})\n"));
+    }
+    let shader = request.shader.display();
+    let scene = request.scene();
+    print(&match scene == request.shader.with_extension("toml") {
+        true => format!("  next            lodc {shader}\n"),
+        false => format!(
+            "  next            lodc {shader} --scene {}\n",
+            scene.display()
+        ),
+    });
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use crate::emit::{self, EmitLevel, Lock, Output, figure};
 use crate::eval::program::Program;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
-use crate::scene::{Reading, Scene, SceneTexture};
+use crate::scene::{Reading, Scene};
 use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, cost};
@@ -157,7 +157,8 @@ impl Ready {
             .scene
             .textures
             .iter()
-            .flat_map(|texture| self.texture_files(texture));
+            .flat_map(|texture| self.files(&texture.files));
+        let model = self.files(&self.scene.model_files);
         let others = self.source.others.iter();
         let lighting = self.scene.lighting.as_ref();
         [request.shader.clone()]
@@ -165,6 +166,7 @@ impl Ready {
             .chain(others.filter_map(|file| file.path.clone()))
             .chain(self.scene_file.clone())
             .chain(lighting.map(|lighting| self.beside_scene(&lighting.file)))
+            .chain(model)
             .chain(textures)
     }
 
@@ -174,13 +176,9 @@ impl Ready {
         read.map_or_else(String::new, |input| input.hash.clone())
     }
 
-    /// The files of a texture; the scene names them from its own folder.
-    fn texture_files<'a>(
-        &'a self,
-        texture: &'a SceneTexture,
-    ) -> impl Iterator<Item = PathBuf> + 'a {
-        let files = texture.files.iter();
-        files.map(|file| self.beside_scene(file))
+    /// Files that the scene names from its own folder.
+    fn files<'a>(&'a self, names: &'a [String]) -> impl Iterator<Item = PathBuf> + 'a {
+        names.iter().map(|file| self.beside_scene(file))
     }
 
     /// The path of a file that the scene names.
@@ -277,7 +275,7 @@ impl Ready {
                 .iter()
                 .filter(|texture| averaged.contains(&texture.name))
                 .flat_map(|texture| {
-                    let places = self.texture_files(texture).zip(&texture.files);
+                    let places = self.files(&texture.files).zip(&texture.files);
                     places.map(move |(file, name)| (texture, file, name))
                 })
                 .map(|(texture, file, name)| emit::LockedTexture {

@@ -15,6 +15,8 @@ pub enum Feed {
     Normal,
     /// Texture coordinates.
     Uv,
+    /// The second set of texture coordinates; of an object that has one set only, that one.
+    SecondUv,
     /// The unit tangent along increasing u; a fourth component is the sign of the bitangent.
     Tangent,
     /// The bitangent: the normal times the tangent, with its sign; towards the top of the image.
@@ -37,6 +39,7 @@ const KEYWORDS: &[(&str, Feed)] = &[
     ("object-position", Feed::ObjectPosition),
     ("normal", Feed::Normal),
     ("uv", Feed::Uv),
+    ("uv1", Feed::SecondUv),
     ("tangent", Feed::Tangent),
     ("bitangent", Feed::Bitangent),
     ("bitangent-sign", Feed::BitangentSign),
@@ -139,7 +142,7 @@ impl Feed {
             Self::Normal | Self::Tangent | Self::Bitangent | Self::ViewDirection | Self::Colour => {
                 (float && size >= 3, "vec3<f32> or vec4<f32>")
             }
-            Self::Uv => (float && size >= 2, "vec2<f32>"),
+            Self::Uv | Self::SecondUv => (float && size >= 2, "vec2<f32>"),
             Self::BitangentSign => (float && size == 1, "f32"),
             Self::ModelColumn(_) => (float && size >= 3, "vec4<f32>"),
             Self::Constant(numbers) => {

@@ -30,12 +30,13 @@ pub struct VertexStage {
 }
 
 /// The attributes of the supplied stage: location, name, type.
-const ATTRIBUTES: [(&str, &str); 5] = [
+const ATTRIBUTES: [(&str, &str); 6] = [
     ("position", "vec3<f32>"),
     ("normal", "vec3<f32>"),
     ("uv", "vec2<f32>"),
     ("tangent", "vec4<f32>"),
     ("colour", "vec4<f32>"),
+    ("uv1", "vec2<f32>"),
 ];
 
 impl VertexStage {
@@ -231,6 +232,7 @@ fn value(source: &Source, input: &Input, feed: &Feed) -> String {
         Feed::ObjectPosition => "vec4<f32>(in.position, 1.0)",
         Feed::Normal => "vec4<f32>(normal, 0.0)",
         Feed::Uv => "vec4<f32>(in.uv, 0.0, 0.0)",
+        Feed::SecondUv => "vec4<f32>(in.uv1, 0.0, 0.0)",
         Feed::Tangent => "vec4<f32>(tangent, in.tangent.w)",
         Feed::Bitangent => "vec4<f32>(cross(normal, tangent) * in.tangent.w, 0.0)",
         Feed::Colour => "in.colour",

@@ -3,7 +3,7 @@
 use super::file::{Entries, Node, Toml, suggest};
 use super::{Inference, Settings};
 use crate::eval::raster::Attribute;
-use crate::front::names::listed;
+use crate::front::names::{listed, words};
 use crate::front::{Feed, Input, Source, VertexStage, inputs};
 use crate::{Diagnostic, Result};
 use naga::{Binding, Scalar, ScalarKind, ShaderStage, TypeInner};
@@ -49,11 +49,19 @@ pub(super) fn resolve(
         let ty = &source.module.types[input.ty].inner;
         given.insert(input.name.clone(), read(toml, key, value, ty, stage)?);
     }
+    if !settings.mesh.second_uvs.is_empty() {
+        for input in later_sets(source, &inputs, &given, stage) {
+            let told = Inference::new("attributes", &input.name, &Feed::SecondUv.to_toml());
+            inferences.push(told.because("the second of its texture coordinates"));
+            given.insert(input.name.clone(), Feed::SecondUv);
+        }
+    }
     if stage == ShaderStage::Fragment {
         let stage = VertexStage::supply(source, &given)?;
         for (name, feed, guessed) in &stage.feeds {
             if *guessed {
-                inferences.push(Inference::new("attributes", name, &feed.to_toml()));
+                let told = Inference::new("attributes", name, &feed.to_toml());
+                inferences.push(told.because(BY_NAME));
             }
         }
         let locations = stage
@@ -84,7 +92,8 @@ pub(super) fn resolve(
             Some(feed) => feed,
             None => match Feed::infer(&input.name, ty, stage) {
                 Some(feed) => {
-                    inferences.push(Inference::new("attributes", &input.name, &feed.to_toml()));
+                    let told = Inference::new("attributes", &input.name, &feed.to_toml());
+                    inferences.push(told.because(BY_NAME));
                     feed
                 }
                 None => {
@@ -102,6 +111,55 @@ pub(super) fn resolve(
         attributes,
         stage: None,
     })
+}
+
+/// Why a feed was taken.
+const BY_NAME: &str = "its name and type say so";
+
+/// The inputs that are texture coordinates by their names, but for the first of them: by the number in the name,
+/// then by place.
+fn later_sets<'i>(
+    source: &Source,
+    inputs: &'i [(u32, Input)],
+    given: &BTreeMap<String, Feed>,
+    stage: ShaderStage,
+) -> Vec<&'i Input> {
+    let number = |name: &str| {
+        let digits: String = name.chars().filter(char::is_ascii_digit).collect();
+        let letter = words(name).last().map(|w| u32::from(w == "b"));
+        digits.parse().ok().or(letter).unwrap_or(0)
+    };
+    let mut sets: Vec<(u32, u32, &Input)> = inputs
+        .iter()
+        .filter(|(_, input)| !given.contains_key(&input.name))
+        .filter(|(_, input)| {
+            let ty = &source.module.types[input.ty].inner;
+            Feed::infer(&input.name, ty, stage) == Some(Feed::Uv)
+        })
+        .map(|(location, input)| (number(&input.name), *location, input))
+        .collect();
+    sets.sort_by_key(|(number, location, _)| (*number, *location));
+    let first = usize::from(!given.values().any(|feed| *feed == Feed::Uv));
+    sets.into_iter().skip(first).map(|(_, _, i)| i).collect()
+}
+
+/// The inputs that nothing feeds, with a line for each that could: their names, the line and the type.
+pub(super) fn unfed(source: &Source) -> Vec<(String, String, String)> {
+    let (entry, stage) = match source.vertex_entry() {
+        Some((entry, _)) => (entry, ShaderStage::Vertex),
+        None => (source.fragment_entry().0, ShaderStage::Fragment),
+    };
+    let inputs = inputs(source, entry).into_iter().filter_map(|input| {
+        let ty = &source.module.types[input.ty].inner;
+        let located = matches!(input.binding, Binding::Location { .. });
+        if !located || Feed::infer(&input.name, ty, stage).is_some() {
+            return None;
+        }
+        let value = Feed::suggestion(ty, stage);
+        let line = Inference::new("attributes", &input.name, &value).line_to_add;
+        Some((input.name.clone(), line, type_name(ty)))
+    });
+    inputs.collect()
 }
 
 fn read(
@@ -197,6 +255,7 @@ fn attribute(feed: &Feed, ty: &TypeInner, settings: &Settings) -> Attribute {
     match feed {
         Feed::Normal => Attribute::Normal,
         Feed::Uv => Attribute::Uv,
+        Feed::SecondUv => Attribute::SecondUv,
         Feed::Tangent => Attribute::Tangent,
         Feed::Bitangent => Attribute::Bitangent,
         Feed::BitangentSign => Attribute::BitangentSign,
@@ -266,7 +325,8 @@ mod tests {
             text: toml,
         };
         let file: SceneFile = toml.parse().unwrap();
-        let settings = Settings::read(toml, &file, Object::Sphere).unwrap();
+        let folder = std::path::Path::new("");
+        let settings = Settings::read(toml, &file, Object::Sphere, folder).unwrap();
         let mut inferences = Vec::new();
         let fed = resolve(&source, toml, &file.attributes, &settings, &mut inferences);
         (fed, inferences)
@@ -361,7 +421,7 @@ mod tests {
         let shader = "@fragment fn fs(@location(0) uv: vec2f, @location(1) q: vec3f) -> @location(0) vec4f { return vec4f(uv, q.xy); }";
         let (with, inferences) = fed(shader, "[attributes]\nq = \"normal\"\n");
         let with = with.unwrap();
-        assert_eq!(with.attributes.len(), 5);
+        assert_eq!(with.attributes.len(), 6);
         assert_eq!(with.attributes[&4], Attribute::Colour);
         assert!(with.stage.is_some());
         assert_eq!(inferences.len(), 1);

@@ -11,7 +11,7 @@ use super::objects::Object;
 use super::textures::{self, Place, is_colour};
 use super::{Inference, InputFile, hash};
 use crate::eval::draw::{Format, Lighting, Plane};
-use crate::eval::machine::{Bindings, Resource};
+use crate::eval::machine::Bindings;
 use crate::eval::program::Program;
 use crate::eval::raster::Frame;
 use crate::front::names::{listed, whole_word, words};
@@ -192,8 +192,15 @@ pub(super) fn resolve(
         .map_err(|refused| refused.at(&source))?;
 
     let mut said = Said::default();
-    let buffers = buffers::resolve(&source, toml, &table.uniforms, &table.storage, &mut said)
-        .map_err(of_lighting)?;
+    let buffers = buffers::resolve(
+        &source,
+        toml,
+        &table.uniforms,
+        &table.storage,
+        &[],
+        &mut said,
+    )
+    .map_err(of_lighting)?;
     if !said.missing.is_empty() {
         let missing = buffers::missing_error(&source, &format!("`{}`", toml.name), &said.missing);
         return Err(of_lighting(missing));
@@ -217,12 +224,10 @@ pub(super) fn resolve(
         .iter()
         .filter(|texture| !held(&texture.name))
     {
-        let resource = Resource::Texture(texture.texture.clone());
-        constant.insert((texture.group, texture.binding), resource);
+        constant.insert((texture.group, texture.binding), texture.resource());
     }
     for sampler in images.samplers {
-        let resource = Resource::Sampler(sampler.sampler);
-        constant.insert((sampler.group, sampler.binding), resource);
+        constant.insert((sampler.group, sampler.binding), sampler.resource());
     }
     let inferred = said.inferences.into_iter().chain(images.inferences);
     found.inferences.extend(inferred.map(|inference| Inference {

@@ -12,8 +12,11 @@ mod buffers;
 pub mod camera;
 pub(crate) mod chance;
 mod file;
+mod gltf;
+pub mod init;
 mod layout;
 mod lighting;
+mod materials;
 pub mod mesh;
 pub mod objects;
 mod semantic;
@@ -26,10 +29,11 @@ pub use lighting::SceneLighting;
 pub use semantic::Semantic;
 pub use settings::{Output, ToneMapping};
 pub use shader::Reading;
+use textures::SceneSampler;
 pub use textures::SceneTexture;
 
 use crate::eval::draw::Lit;
-use crate::eval::machine::{Bindings, Resource};
+use crate::eval::machine::Bindings;
 use crate::eval::raster::{Attribute, Coverage, Frame};
 use crate::front::{Source, VertexStage, inputs, read_text};
 use crate::{Diagnostic, Result};
@@ -52,10 +56,12 @@ use std::sync::Arc;
 pub struct Scene {
     /// The scene file's name as the user gave it; `None` without one.
     pub name: Option<String>,
-    /// Which built-in object is drawn.
+    /// What is drawn.
     pub object: Object,
     /// Its triangles, in object space.
     pub mesh: Arc<Mesh>,
+    /// The files that a model was read from, but for its images, as the scene names them.
+    pub model_files: Vec<String>,
     /// Object to world.
     pub model: DMat4,
     /// The object's bounding sphere in world space.
@@ -104,6 +110,7 @@ pub struct Scene {
     pub inputs: Vec<InputFile>,
     attributes: BTreeMap<u32, Attribute>,
     buffers: Vec<Buffer>,
+    samplers: Vec<SceneSampler>,
     /// The bindings that are the same in every picture.
     constant: Bindings,
     samples: usize,
@@ -141,6 +148,8 @@ pub struct Inference {
     pub table: &'static str,
     /// The line in that table: `"camera.view_proj" = "view-projection"`.
     pub line_to_add: String,
+    /// Why, for a person.
+    pub reason: String,
 }
 
 impl Inference {
@@ -156,7 +165,13 @@ impl Inference {
             as_: plain.unwrap_or(value).to_owned(),
             table,
             line_to_add: format!("{quote}{what}{quote} = {value}"),
+            reason: String::new(),
         }
+    }
+
+    fn because(mut self, reason: impl Into<String>) -> Self {
+        self.reason = reason.into();
+        self
     }
 }
 
@@ -194,32 +209,57 @@ impl Scene {
     /// When the text is no scene, does not fit the shader, or names images that cannot be read; and when
     /// something is neither given nor to be inferred, naming all such things and the lines to add.
     pub fn resolve(source: &Source, file: Option<(&Path, &str)>) -> Result<Self> {
-        let name = match file {
+        Self::attempt(source, file)?.map_err(|missing| {
+            let name = Self::file_name(source, file);
+            let place = match file {
+                Some(_) => format!("`{name}`"),
+                None => format!("a scene file, `{name}`"),
+            };
+            buffers::missing_error(source, &place, &missing)
+        })
+    }
+
+    /// What the scene file is called in messages, or would be.
+    fn file_name(source: &Source, file: Option<(&Path, &str)>) -> String {
+        match file {
             Some((path, _)) => path.display().to_string(),
             None => {
                 let beside = Path::new(&source.name).with_extension("toml");
                 beside.display().to_string()
             }
-        };
+        }
+    }
+
+    /// The same, with what is neither given nor to be inferred as a list.
+    fn attempt(
+        source: &Source,
+        file: Option<(&Path, &str)>,
+    ) -> Result<std::result::Result<Self, Vec<Missing>>> {
+        let name = Self::file_name(source, file);
         let text = file.map_or("", |(_, text)| text);
         let toml = Toml { name: &name, text };
         let file_values = toml.parse()?;
-        let settings = Settings::read(toml, &file_values, default_object(source))?;
+        let folder = match file {
+            Some((path, _)) => path.parent(),
+            None => source.path.as_deref().and_then(Path::parent),
+        };
+        let folder = folder.unwrap_or(Path::new(""));
+        let mut settings = Settings::read(toml, &file_values, default_object(source), folder)?;
         let mut said = Said::default();
+        let materials = settings.file.as_ref().map(|model| &model.materials[..]);
         let mut buffers = buffers::resolve(
             source,
             toml,
             &file_values.uniforms,
             &file_values.storage,
+            materials.unwrap_or_default(),
             &mut said,
         )?;
-        let folder = match file {
-            Some((path, _)) => path.parent(),
-            None => source.path.as_deref().and_then(Path::parent),
-        };
         let place = textures::Place {
-            folder: folder.unwrap_or(Path::new("")),
+            folder,
             seed: settings.seed,
+            model: settings.file.as_ref(),
+            factors: &said.factors,
         };
         let images = textures::resolve(
             source,
@@ -234,7 +274,11 @@ impl Scene {
             toml,
             file_values.lighting.as_ref(),
             &file_values.targets,
-            place,
+            // The object's materials are not the lighting's.
+            textures::Place {
+                model: None,
+                ..place
+            },
             &mut found,
         )?;
         let mut inferences = said.inferences;
@@ -246,11 +290,7 @@ impl Scene {
             &mut inferences,
         )?;
         if !said.missing.is_empty() {
-            let place = match file {
-                Some(_) => format!("`{name}`"),
-                None => format!("a scene file, `{name}`"),
-            };
-            return Err(buffers::missing_error(source, &place, &said.missing));
+            return Ok(Err(said.missing));
         }
         inferences.extend(images.inferences);
         inferences.extend(found.inferences);
@@ -272,15 +312,34 @@ impl Scene {
             name: file.name.clone(),
             hash: hash(file.text.as_bytes()),
         }));
-        let files = images.inputs.into_iter();
-        inputs.extend(files.map(|(name, hash)| InputFile { name, hash }));
+        let of_model = settings.file.as_ref().map(|model| model.inputs.clone());
+        let of_model = of_model.unwrap_or_default();
+        let model_files = of_model.iter().map(|(name, _)| name.clone()).collect();
+        let files = of_model.into_iter().chain(images.inputs);
+        for (name, hash) in files {
+            if !inputs.iter().any(|input| input.name == name) {
+                inputs.push(InputFile { name, hash });
+            }
+        }
         inputs.extend(found.inputs);
         let lit = lighting.as_ref().map_or(1, SceneLighting::samples);
         let samples = buffers.iter().map(Buffer::samples).max().unwrap_or(1);
+        if let Some(model) = &settings.file
+            && !model.bare.is_empty()
+            && fed.attributes.values().any(|attribute| {
+                matches!(
+                    attribute,
+                    Attribute::Tangent | Attribute::Bitangent | Attribute::BitangentSign
+                )
+            })
+        {
+            settings.mesh = gltf::tangents::generate(&settings.mesh, &model.bare);
+        }
         let mut scene = Self {
             name: file.map(|_| name.clone()),
             object: settings.object,
             mesh: Arc::new(settings.mesh),
+            model_files,
             model: settings.model,
             sphere: settings.sphere,
             resolution: settings.resolution,
@@ -299,6 +358,7 @@ impl Scene {
             around: settings.around,
             uniforms,
             textures: images.textures,
+            samplers: images.samplers,
             vertex_stage: fed.stage,
             inferences,
             warnings: [settings.warnings, images.warnings, found.warnings].concat(),
@@ -322,22 +382,20 @@ impl Scene {
         }
         let pose = scene.pose(DVec3::Z, scene.nearest);
         for texture in &scene.textures {
-            let resource = Resource::Texture(texture.texture.clone());
             scene
                 .constant
-                .insert((texture.group, texture.binding), resource);
+                .insert((texture.group, texture.binding), texture.resource());
         }
-        for sampler in images.samplers {
-            let resource = Resource::Sampler(sampler.sampler);
+        for sampler in &scene.samplers {
             scene
                 .constant
-                .insert((sampler.group, sampler.binding), resource);
+                .insert((sampler.group, sampler.binding), sampler.resource());
         }
         for buffer in scene.buffers.iter().filter(|b| b.is_constant()) {
             let resource = buffer.resource(&pose, &scene.sphere, Draw::Listed(0));
             scene.constant.insert(buffer.slot(), resource);
         }
-        Ok(scene)
+        Ok(Ok(scene))
     }
 
     /// The pictures at a distance from the eye to the sphere's centre, in a fixed order: for each view, for each
@@ -477,6 +535,7 @@ fn hash(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eval::machine::Resource;
     use glam::Vec3;
 
     const TEXT: &str = "

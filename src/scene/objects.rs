@@ -1,4 +1,4 @@
-//! The built-in objects: sphere, plane, cube, torus-knot and terrain, about as large as the unit sphere.
+//! What a scene draws: a model from a file, or one of the built-in objects, sphere, plane, cube, torus-knot and terrain, about as large as the unit sphere.
 //!
 //! Each has positions, unit normals, texture coordinates, tangents and colours, and a few thousand triangles.
 //! The same bits come out everywhere: trigonometry is libm's, in f64.
@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// A built-in object.
+/// What is drawn: a built-in object, or a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Object {
     /// Radius 1; u goes round the y axis, v from pole to pole.
@@ -24,6 +24,8 @@ pub enum Object {
     /// Two triangles that have nothing but their vertices' indices, for a vertex stage that reads no more:
     /// one that covers the screen. Scenes cannot name it; it stands in where they name no object.
     Screen,
+    /// A model from a file, which scenes name by its path.
+    Model,
 }
 
 impl Object {
@@ -39,11 +41,17 @@ impl Object {
     /// Its name in a scene.
     pub fn name(self) -> &'static str {
         let mut all = Self::ALL.into_iter();
-        all.find(|(_, object)| *object == self)
-            .map_or("screen", |(name, _)| name)
+        all.find(|(_, object)| *object == self).map_or(
+            if self == Self::Model {
+                "model"
+            } else {
+                "screen"
+            },
+            |(name, _)| name,
+        )
     }
 
-    /// Its triangles. `seed` decides the hills of the terrain and nothing else.
+    /// Its triangles; of a model none, since its file has them. `seed` decides the hills of the terrain and nothing else.
     pub fn mesh(self, seed: u64) -> Mesh {
         match self {
             Self::Sphere => sphere(64, 32),
@@ -54,6 +62,7 @@ impl Object {
             Self::Cube => cube(18),
             Self::TorusKnot => torus_knot(192, 12),
             Self::Terrain => terrain(48, seed),
+            Self::Model => Mesh::default(),
             Self::Screen => Mesh {
                 positions: vec![[0.0; 3]; 6],
                 indices: (0..6).collect(),
@@ -69,7 +78,7 @@ impl Object {
             Self::Plane => (DVec3::Z, 70f64.to_radians()),
             Self::Terrain => (DVec3::Y, 75f64.to_radians()),
             Self::Screen => (DVec3::Z, 0.0),
-            Self::Sphere | Self::Cube | Self::TorusKnot => (DVec3::Z, PI),
+            Self::Sphere | Self::Cube | Self::TorusKnot | Self::Model => (DVec3::Z, PI),
         }
     }
 }

@@ -105,6 +105,29 @@ impl Semantic {
         KEYWORDS.iter().map(|(keyword, _)| *keyword)
     }
 
+    /// What it is, for a person who reads a scene.
+    pub(super) fn says(self) -> &'static str {
+        match self {
+            Self::View => "world to view",
+            Self::Projection => "view to clip",
+            Self::ViewProjection => "world to clip",
+            Self::Model => "object to world",
+            Self::ModelView => "object to view",
+            Self::ModelViewProjection => "object to clip",
+            Self::NormalMatrix => "normals from object to world",
+            Self::InverseView => "view to world",
+            Self::InverseProjection => "clip to view",
+            Self::InverseViewProjection => "clip to world",
+            Self::InverseModel => "world to object",
+            Self::CameraPosition => "the eye in world space",
+            Self::LightDirection => "towards a light far away, in three directions",
+            Self::LightPosition => "a light four radii away, in three directions",
+            Self::LightColour => "white",
+            Self::Time => "seconds, at three times",
+            Self::Resolution => "the picture's size in pixels",
+        }
+    }
+
     fn shape(self) -> Shape {
         match self {
             Self::NormalMatrix => Shape::NormalMatrix,

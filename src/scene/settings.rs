@@ -2,6 +2,7 @@
 
 use super::camera::{Around, Sphere, spread};
 use super::file::{SceneFile, Toml, suggest};
+use super::gltf::Model;
 use super::mesh::Mesh;
 use super::objects::{Object, bounding_sphere};
 use crate::eval::raster::MAX_EDGE;
@@ -9,6 +10,7 @@ use crate::{Diagnostic, Result};
 use glam::{DMat4, DVec3};
 use lodc_passes::autolod::{self, BoundReading};
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 
 /// What the shader's colour is, and how it gets to the display.
@@ -64,6 +66,8 @@ const FARTHEST: f64 = 40.0;
 pub(super) struct Settings {
     pub(super) object: Object,
     pub(super) mesh: Mesh,
+    /// The file that the mesh is from, if it is.
+    pub(super) file: Option<Model>,
     pub(super) model: DMat4,
     pub(super) sphere: Sphere,
     pub(super) resolution: [u32; 2],
@@ -84,8 +88,9 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// Checks what the file says, and fills in what it leaves out: of objects, `other`.
-    pub(super) fn read(toml: Toml, file: &SceneFile, other: Object) -> Result<Self> {
+    /// Checks what the file says, and fills in what it leaves out: of objects, `other`. Models are looked for from
+    /// `folder`.
+    pub(super) fn read(toml: Toml, file: &SceneFile, other: Object, folder: &Path) -> Result<Self> {
         let number = |what: &str,
                       value: &Option<Spanned<f64>>,
                       other: f64,
@@ -108,12 +113,22 @@ impl Settings {
                     "",
                 )),
             };
-        let object = match &file.object {
-            None => other,
-            Some(name) => find_object(toml, name)?,
-        };
         let seed = whole("seed", &file.seed, 1, 0, i64::MAX)?.cast_unsigned();
-        let mesh = object.mesh(seed);
+        let (object, mesh, loaded) = match &file.object {
+            Some(name) if Model::is_named(name.get_ref()) => {
+                let mut loaded = load(toml, name, folder)?;
+                (
+                    Object::Model,
+                    std::mem::take(&mut loaded.mesh),
+                    Some(loaded),
+                )
+            }
+            Some(name) => {
+                let object = find_object(toml, name)?;
+                (object, object.mesh(seed), None)
+            }
+            None => (other, other.mesh(seed), None),
+        };
         let model = read_model(toml, file)?;
         let local = bounding_sphere(&mesh);
         let sphere = Sphere {
@@ -139,7 +154,10 @@ impl Settings {
         let levels = whole("levels", &file.levels, 5, 1, MOST_LEVELS)?;
         let (nearest, farthest) = read_distances(toml, file, &sphere)?;
         let (views, around) = read_views(toml, file, object)?;
-        let mut warnings = Vec::new();
+        let mut warnings = match &loaded {
+            Some(loaded) => loaded.warnings.clone(),
+            None => Vec::new(),
+        };
         if nearest <= sphere.radius {
             let warning = Diagnostic::warning(format!(
                 "at the nearest distance, {nearest}, the eye is inside the object's bounding sphere"
@@ -159,6 +177,7 @@ impl Settings {
         Ok(Self {
             object,
             mesh,
+            file: loaded,
             model,
             sphere,
             resolution,
@@ -210,6 +229,28 @@ impl Settings {
     }
 }
 
+/// Reads a model; what is wrong with it is said at its name.
+fn load(toml: Toml, name: &Spanned<String>, folder: &Path) -> Result<Model> {
+    let at = |error: Box<Diagnostic>| {
+        error
+            .with_source(toml.name, toml.text)
+            .with_label(name.span(), "")
+    };
+    let model = Model::read(name.get_ref(), folder).map_err(at)?;
+    let mut positions = model.mesh.positions.iter();
+    let first = positions.next();
+    if positions.all(|position| Some(position) == first) {
+        return Err(at(Diagnostic::error(format!(
+            "all vertices of the model `{}` are in one place",
+            name.get_ref()
+        ))
+        .with_note(
+            "check the scale of its nodes: an object without a size has no distance",
+        )));
+    }
+    Ok(model)
+}
+
 fn find_object(toml: Toml, name: &Spanned<String>) -> Result<Object> {
     let mut all = Object::ALL.into_iter();
     if let Some((_, object)) = all.find(|(known, _)| known == name.get_ref()) {
@@ -222,16 +263,16 @@ fn find_object(toml: Toml, name: &Spanned<String>) -> Result<Object> {
         "",
     );
     let error = suggest(error, name.get_ref(), &known);
-    let file = [".obj", ".gltf", ".glb", ".ply", ".stl", ".fbx"];
+    let file = [
+        ".obj", ".ply", ".stl", ".fbx", ".off", ".dae", ".usd", ".usdz", ".blend",
+    ];
     Err(
         match file
             .iter()
             .any(|end| name.get_ref().to_lowercase().ends_with(end))
         {
-            true => {
-                error.with_note("this build draws its own objects only, and reads no mesh files")
-            }
-            false => error,
+            true => error.with_note("models are glTF 2.0: export it as .gltf or .glb"),
+            false => error.with_note("a model is named by its file, .gltf or .glb"),
         },
     )
 }
@@ -427,7 +468,7 @@ mod tests {
             name: "a.toml",
             text,
         };
-        Settings::read(toml, &toml.parse()?, Object::Sphere)
+        Settings::read(toml, &toml.parse()?, Object::Sphere, Path::new(""))
     }
 
     #[test]
@@ -630,7 +671,7 @@ mod tests {
                 .unwrap_err()
                 .notes
                 .join(" ")
-                .contains("reads no mesh files")
+                .contains("export it as .gltf or .glb")
         );
     }
 }

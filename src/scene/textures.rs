@@ -1,8 +1,12 @@
-//! Textures and samplers: images from files, placeholders for what has none, wrap modes.
+//! Textures and samplers: images from files and from the object's materials, placeholders for what has none, wrap
+//! modes.
 
 use super::Inference;
 use super::file::{Entries, Node, Toml, suggest};
+use super::gltf::{MOST_BYTES, Model, add_input};
+use super::materials::{Factor, Role};
 use crate::eval::image::{Image, Space, decode};
+use crate::eval::machine::Resource;
 use crate::eval::texture::{Comparison, Dimension, Sampler, Texture, Wrap};
 use crate::front::names::{listed, words};
 use crate::front::{Source, similar_file};
@@ -23,21 +27,51 @@ pub struct SceneTexture {
     pub group: u32,
     /// Its binding.
     pub binding: u32,
-    /// The image; of a dynamic texture a placeholder.
-    pub texture: Arc<Texture>,
+    /// Its image, or one for each draw of the object when they differ; of a dynamic texture a placeholder.
+    pub images: Vec<Arc<Texture>>,
     /// Nobody knows its image: it is never averaged, baked or removed.
     pub dynamic: bool,
     /// The files of its image, as the scene names them.
     pub files: Vec<String>,
 }
 
+impl SceneTexture {
+    /// What is bound.
+    pub(super) fn resource(&self) -> Resource {
+        per_draw(self.images.iter().cloned().map(Resource::Texture).collect())
+    }
+}
+
 /// A sampler of the shader.
 #[derive(Clone, Debug)]
 pub(super) struct SceneSampler {
+    pub(super) name: String,
+    /// Whether the object's materials say how it samples.
+    pub(super) of_model: bool,
     pub(super) group: u32,
     pub(super) binding: u32,
-    pub(super) sampler: Arc<Sampler>,
+    /// One, or one for each draw of the object when they differ.
+    pub(super) samplers: Vec<Arc<Sampler>>,
 }
+
+impl SceneSampler {
+    /// What is bound.
+    pub(super) fn resource(&self) -> Resource {
+        let samplers = self.samplers.iter().cloned().map(Resource::Sampler);
+        per_draw(samplers.collect())
+    }
+}
+
+/// One resource as it is, several as one for each draw.
+fn per_draw(all: Vec<Resource>) -> Resource {
+    match <[Resource; 1]>::try_from(all) {
+        Ok([one]) => one,
+        Err(several) => Resource::PerDraw(several.into()),
+    }
+}
+
+/// The most texels that the images of a scene may have together: 2 GiB, and a third more for their MIP levels.
+const MOST_TEXELS: u64 = 1 << 27;
 
 /// What is made of `[textures]` and `[samplers]`.
 #[derive(Debug, Default)]
@@ -48,6 +82,14 @@ pub(super) struct Images {
     pub(super) warnings: Vec<Diagnostic>,
     /// Every file that was read and the hash of its bytes.
     pub(super) inputs: Vec<(String, String)>,
+    /// Texels that were read so far.
+    texels: u64,
+    /// Images of the model, by their index and whether they are colours.
+    decoded: BTreeMap<(usize, bool), (Arc<Texture>, String)>,
+    /// Textures of one texel, by its bits.
+    constants: BTreeMap<[u32; 4], Arc<Texture>>,
+    /// The textures that take their images from the model.
+    roles: BTreeMap<String, &'static Role>,
 }
 
 /// What a texture variable can hold.
@@ -81,6 +123,20 @@ impl Kind {
         })
     }
 
+    /// Whether it is a plain picture: one image of colours or numbers.
+    fn is_plain(self) -> bool {
+        self.dimension == Dimension::D2
+            && !self.arrayed
+            && !self.one_dimension
+            && matches!(
+                self.class,
+                ImageClass::Sampled {
+                    kind: ScalarKind::Float,
+                    multi: false
+                }
+            )
+    }
+
     /// Its WGSL type.
     fn name(self) -> String {
         let shape = match (self.dimension, self.one_dimension) {
@@ -111,6 +167,14 @@ impl Kind {
         }
     }
 
+    /// A value that a person could put in its place.
+    fn example(self) -> String {
+        match self.wants().0 {
+            "file" => "\"...png\"".to_owned(),
+            key => format!("{{ {key} = [\"...png\"] }}"),
+        }
+    }
+
     /// The key under which a scene names its images, and how many there are.
     fn wants(self) -> (&'static str, &'static str) {
         match (self.dimension, self.arrayed) {
@@ -132,6 +196,10 @@ pub(super) struct Place<'p> {
     pub(super) folder: &'p Path,
     /// The scene's seed.
     pub(super) seed: u64,
+    /// The model that is drawn, if it is one.
+    pub(super) model: Option<&'p Model>,
+    /// The keywords of the material factors that the shader multiplies by itself.
+    pub(super) factors: &'p BTreeSet<&'static str>,
 }
 
 /// Reads every texture that the scene names, makes placeholders for the rest, and sets up the samplers.
@@ -177,6 +245,9 @@ pub(super) fn resolve(
             Some(Node::Text(text)) => text == "dynamic",
             Some(_) => false,
             None if !is_used(source, handle) => continue,
+            None if place.model.is_some() && kind.is_plain() && Role::infer(name).is_some() => {
+                false
+            }
             None => {
                 found
                     .warnings
@@ -184,27 +255,40 @@ pub(super) fn resolve(
                 true
             }
         };
-        let (texture, files) = match entry {
-            Some(entry) if !dynamic => {
-                let read = Reader {
-                    toml,
-                    place,
-                    name,
-                    kind,
-                };
-                let (texture, files) = read.texture(entry, &mut found, &mut wraps)?;
-                (texture, files)
+        let read = Reader {
+            toml,
+            place,
+            name,
+            kind,
+        };
+        let (images, files) = match (entry, Role::infer(name), place.model) {
+            (Some(entry), ..) if !dynamic => match read.said_role(entry)? {
+                Some((role, space, model)) => read.of_model(role, space, model, &mut found)?,
+                None => {
+                    let (texture, files) = read.texture(entry, &mut found, &mut wraps)?;
+                    (vec![Arc::new(texture)], files)
+                }
+            },
+            (None, Some(role), Some(model)) if !dynamic => {
+                let said = read.of_model(role, role.space, model, &mut found)?;
+                let line = format!("{{ role = \"{}\" }}", role.keyword);
+                let mut inference = Inference::new("textures", name, &line);
+                inference.as_ = read.describe(role, model);
+                let reason = format!("of the model's materials: {}", inference.as_);
+                found.inferences.push(inference.because(reason));
+                said
             }
             _ => {
                 let seed = place.seed ^ hash_of(name);
-                (Texture::placeholder(seed, kind.dimension, 1), Vec::new())
+                let placeholder = Texture::placeholder(seed, kind.dimension, 1);
+                (vec![Arc::new(placeholder)], Vec::new())
             }
         };
         found.textures.push(SceneTexture {
             name: name.clone(),
             group: binding.group,
             binding: binding.binding,
-            texture: Arc::new(texture),
+            images,
             dynamic,
             files,
         });
@@ -228,18 +312,61 @@ pub(super) fn resolve(
             Some(entry) => read_sampler(toml, name, entry, &mut sampler)?,
             None => false,
         };
+        let mut sampled = Vec::new();
         if !said {
-            let with = pairs.iter().filter(|(_, s)| *s == handle).map(|(t, _)| *t);
-            let wrap = shared_wrap(source, toml, name, with, &wraps)?;
+            let with = || pairs.iter().filter(|(_, s)| *s == handle).map(|(t, _)| *t);
+            let wrap = shared_wrap(source, toml, name, with(), &wraps)?;
             sampler.wrap = [wrap; 3];
+            let named = with().filter_map(|t| module.global_variables[t].name.as_deref());
+            let named: Vec<&str> = named.collect();
+            if let Some(model) = place.model
+                && !named.iter().any(|name| wraps.contains_key(*name))
+            {
+                sampled = model_samplers(model, &named, &found.roles, &sampler);
+            }
+        }
+        let of_model = !sampled.is_empty();
+        if sampled.windows(2).all(|w| w[0] == w[1]) {
+            sampled.truncate(1);
+        }
+        if sampled.is_empty() {
+            sampled.push(sampler);
         }
         found.samplers.push(SceneSampler {
+            name: name.clone(),
+            of_model,
             group: binding.group,
             binding: binding.binding,
-            sampler: Arc::new(sampler),
+            samplers: sampled.into_iter().map(Arc::new).collect(),
         });
     }
     Ok(found)
+}
+
+/// How the materials of a model's draws sample the textures that a sampler is used with: as the first of them that
+/// comes from the material says. Nothing when none does.
+fn model_samplers(
+    model: &Model,
+    textures: &[&str],
+    roles: &BTreeMap<String, &'static Role>,
+    other: &Sampler,
+) -> Vec<Sampler> {
+    let roles: Vec<&Role> = textures
+        .iter()
+        .filter_map(|t| roles.get(*t).copied())
+        .collect();
+    if roles.is_empty() {
+        return Vec::new();
+    }
+    let of = |maps: &BTreeMap<&'static str, super::materials::Map>| {
+        let found = roles.iter().find_map(|role| maps.get(role.keyword));
+        let said = found.map_or(*other, |map| map.sampler);
+        Sampler {
+            comparison: other.comparison,
+            ..said
+        }
+    };
+    model.materials.iter().map(|m| of(&m.maps)).collect()
 }
 
 /// Whether a chosen entry point may use a variable.
@@ -404,6 +531,37 @@ fn read_sampler(
     Ok(wraps)
 }
 
+/// The colour spaces that a scene can name.
+const SPACES: [(&str, Space); 2] = [("srgb", Space::Srgb), ("linear", Space::Linear)];
+
+/// A texture of one texel.
+fn constant_texture(texel: [f32; 4]) -> Arc<Texture> {
+    let image = Image {
+        width: 1,
+        height: 1,
+        texels: vec![texel],
+    };
+    // One texel makes a texture always.
+    Arc::new(
+        Texture::new(Dimension::D2, vec![image])
+            .unwrap_or_else(|_| Texture::placeholder(0, Dimension::D2, 1)),
+    )
+}
+
+impl Images {
+    /// Counts an image's texels.
+    fn count(&mut self, file: &str, image: &Image) -> Result<()> {
+        self.texels += image.texels.len() as u64;
+        match self.texels <= MOST_TEXELS {
+            true => Ok(()),
+            false => Err(Diagnostic::error(format!(
+                "with `{file}` the images of the scene have more than {MOST_TEXELS} texels together"
+            ))
+            .with_note("make some of them smaller: levels of detail are for distances at which it is not seen")),
+        }
+    }
+}
+
 /// Reads one entry of `[textures]`.
 struct Reader<'r> {
     toml: Toml<'r>,
@@ -412,7 +570,145 @@ struct Reader<'r> {
     kind: Kind,
 }
 
-impl Reader<'_> {
+impl<'r> Reader<'r> {
+    /// What `{ role = "..." }` says: the role, the colour space and the model.
+    fn said_role(
+        &self,
+        entry: &Spanned<Node>,
+    ) -> Result<Option<(&'static Role, Space, &'r Model)>> {
+        let toml = self.toml;
+        let Node::Table(keys) = entry.get_ref() else {
+            return Ok(None);
+        };
+        let Some(said) = keys.get("role") else {
+            return Ok(None);
+        };
+        let known: Vec<(&str, &'static Role)> = Role::keywords()
+            .filter_map(|keyword| Some((keyword, Role::of_keyword(keyword)?)))
+            .collect();
+        let role = match said.get_ref() {
+            Node::Text(text) if Role::of_keyword(text).is_some() => Role::of_keyword(text),
+            _ => None,
+        };
+        let role = match role {
+            Some(role) => role,
+            None => choice(toml, "role", said, &known)?,
+        };
+        let mut space = role.space;
+        for (key, value) in &keys.0 {
+            match key.get_ref().as_str() {
+                "role" => {}
+                "space" => space = choice(toml, "colour space", value, &SPACES)?,
+                other => {
+                    let error = toml.error(format!("unknown key `{other}`"), key.span(), "");
+                    return Err(suggest(error, other, &["role", "space"]));
+                }
+            }
+        }
+        if !self.kind.is_plain() {
+            return Err(toml
+                .error(
+                    format!("`{}` is a {}", self.name, self.kind.name()),
+                    said.span(),
+                    "a material's textures are of the type texture_2d<f32>",
+                )
+                .with_note("give its images, or write `\"dynamic\"`"));
+        }
+        match self.place.model {
+            Some(model) => Ok(Some((role, space, model))),
+            None => Err(toml
+                .error(
+                    format!(
+                        "`{}` is to be a texture of a material, and the object has none",
+                        self.name
+                    ),
+                    said.span(),
+                    "",
+                )
+                .with_note("name a model, `object = \"model.glb\"`, or give a file")),
+        }
+    }
+
+    /// The images of a role in the materials of all draws, one when all are the same; and the files they are in.
+    fn of_model(
+        &self,
+        role: &'static Role,
+        space: Space,
+        model: &Model,
+        found: &mut Images,
+    ) -> Result<(Vec<Arc<Texture>>, Vec<String>)> {
+        found.roles.insert(self.name.to_owned(), role);
+        let mut images: Vec<Arc<Texture>> = Vec::new();
+        let mut files: Vec<String> = Vec::new();
+        for material in &model.materials {
+            let Some(map) = material.maps.get(role.keyword) else {
+                let texel = self.stand_in(role, material);
+                let constant = found.constants.entry(texel.map(f32::to_bits));
+                images.push(constant.or_insert_with(|| constant_texture(texel)).clone());
+                continue;
+            };
+            let key = (map.image, space == Space::Srgb);
+            let (texture, file) = match found.decoded.get(&key) {
+                Some(known) => known.clone(),
+                None => {
+                    let decoded = model.image(map.image, space)?;
+                    if let Some(hash) = decoded.hash {
+                        add_input(&mut found.inputs, &decoded.file, hash);
+                    }
+                    found.count(&decoded.file, &decoded.image)?;
+                    let texture = Texture::new(Dimension::D2, vec![decoded.image])?;
+                    let known = (Arc::new(texture.with_mip_chain()), decoded.file);
+                    found.decoded.insert(key, known.clone());
+                    known
+                }
+            };
+            images.push(texture);
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+        if images.windows(2).all(|w| Arc::ptr_eq(&w[0], &w[1])) {
+            images.truncate(1);
+        }
+        Ok((images, files))
+    }
+
+    /// The texel that stands for a texture that a material has not: the one that changes nothing, times the factor
+    /// that the shader has no place for.
+    fn stand_in(&self, role: &Role, material: &super::materials::Material) -> [f32; 4] {
+        let mut texel = role.neutral;
+        let factor = role.factor.filter(|f| !self.place.factors.contains(f));
+        if let Some(factor) = factor.and_then(Factor::of_keyword) {
+            for (to, number) in texel.iter_mut().zip(material.factor(factor)) {
+                *to *= number as f32;
+            }
+        }
+        texel
+    }
+
+    /// What a texture was taken for: the role, and what stands for it where it is missing.
+    fn describe(&self, role: &Role, model: &Model) -> String {
+        let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        for material in &model.materials {
+            if !material.maps.contains_key(role.keyword) {
+                let colour = colour_name(self.stand_in(role, material));
+                missing.entry(colour).or_default().push(&material.name);
+            }
+        }
+        let all = |names: &Vec<&str>| names.len() == model.materials.len();
+        let said: Vec<String> = missing
+            .iter()
+            .map(|(colour, names)| match all(names) {
+                true => format!("{colour}: no material has it"),
+                false => format!("{colour} for {}", listed(names.iter().copied())),
+            })
+            .collect();
+        match said.is_empty() {
+            true => role.keyword.to_owned(),
+            false => format!("{} ({})", role.keyword, said.join("; ")),
+        }
+    }
+
     fn texture(
         &self,
         entry: &Spanned<Node>,
@@ -482,8 +778,7 @@ impl Reader<'_> {
                             }
                         }
                         "space" => {
-                            let spaces = [("srgb", Space::Srgb), ("linear", Space::Linear)];
-                            space = Some(choice(toml, "colour space", value, &spaces)?);
+                            space = Some(choice(toml, "colour space", value, &SPACES)?);
                         }
                         "wrap" => {
                             let wrap = wrap_of(toml, value)?;
@@ -508,7 +803,7 @@ impl Reader<'_> {
         let space = self.space(space, &files, &mut found.inferences);
         let images = files
             .iter()
-            .map(|(file, span)| self.image(file, span.clone(), space, &mut found.inputs))
+            .map(|(file, span)| self.image(file, span.clone(), space, found))
             .collect::<Result<Vec<_>>>()?;
         if self.kind.one_dimension && images.iter().any(|i| i.height != 1) {
             return Err(wrong(entry.span(), "this image is higher than one texel"));
@@ -574,10 +869,24 @@ impl Reader<'_> {
         file: &str,
         span: Range<usize>,
         space: Space,
-        inputs: &mut Vec<(String, String)>,
+        found: &mut Images,
     ) -> Result<Image> {
         let toml = self.toml;
         let path = self.place.folder.join(file);
+        let data = std::fs::metadata(&path).ok().filter(|data| !data.is_dir());
+        if data.is_some_and(|data| !data.is_file() || data.len() > MOST_BYTES) {
+            return Err(toml
+                .error(
+                    format!(
+                        "the image `{file}` of `{}` is no plain file of at most {} MiB",
+                        self.name,
+                        MOST_BYTES >> 20
+                    ),
+                    span,
+                    "",
+                )
+                .with_note("name a PNG or JPEG file"));
+        }
         let bytes = std::fs::read(&path).map_err(|error| {
             if path.is_dir() {
                 return toml
@@ -609,11 +918,20 @@ impl Reader<'_> {
                 self.name
             ))
         })?;
-        if !inputs.iter().any(|(name, _)| name == file) {
-            inputs.push((file.to_owned(), super::hash(&bytes)));
-        }
-        decode(file, &bytes, space)
-            .map_err(|error| error.with_source(toml.name, toml.text).with_label(span, ""))
+        add_input(&mut found.inputs, file, super::hash(&bytes));
+        let image =
+            decode(file, &bytes, space).and_then(|image| found.count(file, &image).map(|()| image));
+        image.map_err(|error| error.with_source(toml.name, toml.text).with_label(span, ""))
+    }
+}
+
+/// A texel for a person.
+fn colour_name(texel: [f32; 4]) -> String {
+    match texel {
+        [1.0, 1.0, 1.0, _] => "white".to_owned(),
+        [0.0, 0.0, 0.0, _] => "black".to_owned(),
+        [0.5, 0.5, 1.0, _] => "flat".to_owned(),
+        [r, g, b, _] => format!("{r}, {g}, {b}"),
     }
 }
 
@@ -652,11 +970,7 @@ fn no_image(
     kind: Kind,
     file: &str,
 ) -> Box<Diagnostic> {
-    let (key, _) = kind.wants();
-    let value = match key {
-        "file" => "\"...png\"".to_owned(),
-        key => format!("{{ {key} = [\"...png\"] }}"),
-    };
+    let value = kind.example();
     let remark = match sampled_in(source, handle) {
         Some(line) => format!("sampled in line {line}"),
         None => "without an image".to_owned(),
@@ -688,6 +1002,16 @@ fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<u32> {
         })
     })
     .min()
+}
+
+/// The line that gives a texture its image, and its type.
+pub(super) fn to_fill_in(source: &Source, name: &str) -> Option<(String, String)> {
+    let module = &source.module;
+    let mut all = module.global_variables.iter();
+    let (_, variable) = all.find(|(_, v)| v.name.as_deref() == Some(name))?;
+    let kind = Kind::of(&module.types[variable.ty].inner)?;
+    let line = Inference::new("textures", name, &kind.example()).line_to_add;
+    Some((line, kind.name()))
 }
 
 /// A number from a name, the same always (FNV-1a).
@@ -751,6 +1075,8 @@ mod tests {
             let place = Place {
                 folder: &self.0,
                 seed: 1,
+                model: None,
+                factors: &BTreeSet::new(),
             };
             resolve(&source, toml, &file.textures, &file.samplers, place)
         }
@@ -778,14 +1104,14 @@ mod tests {
         let images = Folder::new("read").resolve(GOOD).unwrap();
         assert!(images.warnings.is_empty());
         let texture = |name: &str| images.textures.iter().find(|t| t.name == name).unwrap();
-        let first = |name: &str| texture(name).texture.levels()[0].texels[0];
+        let first = |name: &str| texture(name).images[0].levels()[0].texels[0];
         assert!((first("albedo")[0] - 0.2159).abs() < 1e-3);
         assert!((first("detail")[0] - 128.0 / 255.0).abs() < 1e-6);
         assert_eq!(first("ids"), [128.0, 64.0, 32.0, 255.0]);
-        assert_eq!(texture("sky").texture.dimension(), Dimension::Cube);
-        assert_eq!(texture("layers").texture.layers(), 2);
-        assert_eq!(texture("albedo").texture.level_count(), 3);
-        assert_eq!(texture("ids").texture.level_count(), 1);
+        assert_eq!(texture("sky").images[0].dimension(), Dimension::Cube);
+        assert_eq!(texture("layers").images[0].layers(), 2);
+        assert_eq!(texture("albedo").images[0].level_count(), 3);
+        assert_eq!(texture("ids").images[0].level_count(), 1);
         assert!(texture("shadow").dynamic && !texture("albedo").dynamic);
         assert_eq!(texture("layers").files, ["a.png", "a.png"]);
         // What nothing reads is not there.
@@ -807,16 +1133,20 @@ mod tests {
     #[test]
     fn samplers_take_the_wrap_of_their_textures() {
         let images = Folder::new("wrap").resolve(GOOD).unwrap();
-        let wraps: Vec<_> = images.samplers.iter().map(|s| s.sampler.wrap[0]).collect();
+        let wraps: Vec<_> = images
+            .samplers
+            .iter()
+            .map(|s| s.samplers[0].wrap[0])
+            .collect();
         assert_eq!(wraps, [Wrap::Repeat, Wrap::MirrorRepeat, Wrap::Repeat]);
-        let shadow = &images.samplers[2].sampler;
+        let shadow = &images.samplers[2].samplers[0];
         assert!(!shadow.linear_magnification && shadow.comparison == Comparison::Greater);
         let text = GOOD.replace(
             "[samplers]",
             "[samplers]\nother_sampler = { wrap = \"clamp\" }",
         );
         let images = Folder::new("wrap2").resolve(&text).unwrap();
-        assert_eq!(images.samplers[1].sampler.wrap[0], Wrap::ClampToEdge);
+        assert_eq!(images.samplers[1].samplers[0].wrap[0], Wrap::ClampToEdge);
     }
 
     #[test]
@@ -833,9 +1163,9 @@ mod tests {
         );
         assert!(images.textures.iter().all(|t| t.dynamic));
         // Placeholders differ, and are the same on every run.
-        assert_ne!(images.textures[0].texture, images.textures[1].texture);
+        assert_ne!(images.textures[0].images, images.textures[1].images);
         let again = Folder::new("dynamic2").resolve("").unwrap();
-        assert_eq!(images.textures[0].texture, again.textures[0].texture);
+        assert_eq!(images.textures[0].images, again.textures[0].images);
     }
 
     #[test]
@@ -954,6 +1284,8 @@ mod tests {
         let place = Place {
             folder: &folder.0,
             seed: 1,
+            model: None,
+            factors: &BTreeSet::new(),
         };
         let images = |text: &str| {
             let toml = Toml {

@@ -3,7 +3,7 @@
 
 use super::samples::{SampleSet, compile};
 use crate::eval::draw::{Shading, shade_into};
-use crate::eval::texture::Dimension;
+use crate::eval::texture::{Dimension, Texture};
 use crate::scene::{Scene, SceneTexture};
 use glam::{Vec2, Vec3};
 use lodc_passes::facts::{TextureFacts, ValueFacts};
@@ -11,6 +11,7 @@ use lodc_passes::{Facts, Shader, Stage, autolod};
 use naga::{Expression, Handle, Scalar, TypeInner};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 impl SampleSet<'_> {
     /// What the samples show of every float value of a shader, and of the scene's textures.
@@ -84,7 +85,11 @@ fn texture_facts(scene: &Scene, distance: f64) -> BTreeMap<String, TextureFacts>
                 .log2();
             (
                 texture.name.clone(),
-                texture.texture.facts(level.max(0.0) as f32),
+                match texture.images.as_slice() {
+                    [image] => image.facts(level.max(0.0) as f32),
+                    // Draws with different images share no mean; what the samples see of them does.
+                    _ => TextureFacts::default(),
+                },
             )
         })
         .collect()
@@ -98,21 +103,28 @@ pub(crate) fn texels_per_pixel(
     distance: f64,
 ) -> Option<f64> {
     let mesh = &scene.mesh;
-    if texture.texture.dimension() != Dimension::D2 || mesh.uvs.is_empty() {
+    let flat = |image: &Arc<Texture>| image.dimension() == Dimension::D2;
+    if !texture.images.iter().all(flat) || mesh.uvs.is_empty() {
         return None;
     }
-    let (mut surface, mut mapped) = (0.0, 0.0);
-    for corners in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|i| corners[i] as usize);
-        let position = |i: usize| Vec3::from(mesh.positions[i]).as_dvec3();
-        let uv = |i: usize| Vec2::from(mesh.uvs[i]).as_dvec2();
-        surface += (position(b) - position(a))
-            .cross(position(c) - position(a))
-            .length();
-        mapped += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
+    let (mut surface, mut texels) = (0.0, 0.0);
+    for (index, draw) in mesh.draws().into_iter().enumerate() {
+        let mut mapped = 0.0;
+        for corners in
+            mesh.indices[3 * draw.triangles.start..3 * draw.triangles.end].chunks_exact(3)
+        {
+            let [a, b, c] = [0, 1, 2].map(|i| corners[i] as usize);
+            let position = |i: usize| Vec3::from(mesh.positions[i]).as_dvec3();
+            let uv = |i: usize| Vec2::from(mesh.uvs[i]).as_dvec2();
+            surface += (position(b) - position(a))
+                .cross(position(c) - position(a))
+                .length();
+            mapped += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
+        }
+        let image = texture.images.get(index).or(texture.images.last())?;
+        let [width, height, _] = image.size(0);
+        texels += mapped * f64::from(width) * f64::from(height);
     }
-    let [width, height, _] = texture.texture.size(0);
-    let texels = mapped * f64::from(width) * f64::from(height);
     let scale = (texels / surface).sqrt() / autolod::rho(&scene.view(distance));
     (scale.is_finite() && scale > 0.0).then_some(scale)
 }

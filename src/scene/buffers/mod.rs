@@ -7,6 +7,7 @@ use super::camera::{Pose, Sphere};
 use super::chance::{child, unit};
 use super::file::{Entries, Toml};
 use super::layout::{LARGEST, Layout, Leaf, Place, article};
+use super::materials::{Factor, Material};
 use super::semantic::Semantic;
 use super::{Inference, Missing};
 use crate::eval::machine::Resource;
@@ -55,6 +56,10 @@ pub(super) enum Fill {
     /// As `Sampled`; whatever lies between the first and the last is meant too.
     Range(Vec<Vec<f64>>),
     Dynamic(Vec<f64>),
+    /// A factor of the object's materials, until it is known which those are.
+    Factor(&'static Factor),
+    /// One for each draw of the object.
+    PerDraw(Vec<Vec<f64>>),
 }
 
 impl Fill {
@@ -63,6 +68,8 @@ impl Fill {
             Self::Fixed(_) => Variation::Fixed,
             Self::Semantic(_) | Self::Sampled(_) | Self::Range(_) => Variation::Sampled,
             Self::Dynamic(_) => Variation::Dynamic,
+            Self::PerDraw(all) if all.windows(2).all(|w| w[0] == w[1]) => Variation::Fixed,
+            Self::Factor(_) | Self::PerDraw(_) => Variation::Sampled,
         }
     }
 
@@ -70,7 +77,7 @@ impl Fill {
         match self {
             Self::Semantic(semantic) => semantic.samples(),
             Self::Sampled(samples) | Self::Range(samples) => samples.len(),
-            Self::Fixed(_) | Self::Dynamic(_) => 1,
+            Self::Fixed(_) | Self::Dynamic(_) | Self::Factor(_) | Self::PerDraw(_) => 1,
         }
     }
 }
@@ -130,9 +137,9 @@ impl Buffer {
 
     /// Whether its bytes are the same in every picture.
     pub(super) fn is_constant(&self) -> bool {
-        self.parts
-            .iter()
-            .all(|(_, fill)| fill.variation() != Variation::Sampled)
+        self.parts.iter().all(|(_, fill)| {
+            fill.variation() != Variation::Sampled || matches!(fill, Fill::PerDraw(_))
+        })
     }
 
     /// Where it is bound.
@@ -142,6 +149,21 @@ impl Buffer {
 
     /// Its contents in a picture.
     pub(super) fn resource(&self, pose: &Pose, sphere: &Sphere, draw: Draw) -> Resource {
+        let draws = self.parts.iter().map(|(_, fill)| match fill {
+            Fill::PerDraw(all) => all.len(),
+            _ => 1,
+        });
+        let contents = |of_mesh| {
+            let bytes = self.contents(pose, sphere, draw, of_mesh);
+            Resource::Buffer(Arc::new(bytes))
+        };
+        match draws.max() {
+            Some(draws) if draws > 1 => Resource::PerDraw((0..draws).map(contents).collect()),
+            _ => contents(0),
+        }
+    }
+
+    fn contents(&self, pose: &Pose, sphere: &Sphere, draw: Draw, of_mesh: usize) -> Vec<u8> {
         let mut bytes = vec![0; self.size];
         for (leaf, fill) in &self.parts {
             match fill {
@@ -159,9 +181,16 @@ impl Buffer {
                         leaf.write(&numbers, &mut bytes);
                     }
                 }
+                Fill::PerDraw(draws) => {
+                    if let Some(numbers) = draws.get(of_mesh).or(draws.last()) {
+                        leaf.write(numbers, &mut bytes);
+                    }
+                }
+                // None is left when a buffer is made.
+                Fill::Factor(_) => {}
             }
         }
-        Resource::Buffer(Arc::new(bytes))
+        bytes
     }
 
     /// Its parts, as the rest of the compiler sees them.
@@ -240,14 +269,18 @@ pub(super) struct Said {
     pub(super) inferences: Vec<Inference>,
     /// Parts that have no value and mean nothing known.
     pub(super) missing: Vec<Missing>,
+    /// The keywords of the material factors that the shader has a place for.
+    pub(super) factors: BTreeSet<&'static str>,
 }
 
-/// Fills every buffer of a shader. `tables` are the file's `[uniforms]` and `[storage]`.
+/// Fills every buffer of a shader from the file's `[uniforms]` and `[storage]`, and from the materials of the object's
+/// draws, if it has any.
 pub(super) fn resolve(
     source: &Source,
     toml: Toml,
     uniforms: &Entries,
     storage: &Entries,
+    materials: &[Material],
     said: &mut Said,
 ) -> Result<Vec<Buffer>> {
     let layout = Layout::new(&source.module);
@@ -311,6 +344,26 @@ pub(super) fn resolve(
                     .map(|(_, fill)| fill)
             };
             if let Some(fill) = given(false) {
+                let fill = match fill {
+                    Fill::Factor(factor) if materials.is_empty() => {
+                        let key = own().find(|g| g.fills.iter().any(|(l, _)| l.path == leaf.path));
+                        let span = key.map_or(0..0, |given| given.key.span());
+                        return Err(toml
+                            .error(
+                                format!(
+                                    "`{}` is to be the {} of a material, and the object has none",
+                                    leaf.path, factor.keyword
+                                ),
+                                span,
+                                "",
+                            )
+                            .with_note(
+                                "name a model, `object = \"model.glb\"`, or give a number",
+                            ));
+                    }
+                    Fill::Factor(factor) => per_draw(factor, materials, &leaf, said),
+                    other => other,
+                };
                 parts.push((leaf, fill));
                 continue;
             }
@@ -336,12 +389,22 @@ pub(super) fn resolve(
                     let keyword = semantic.keyword();
                     Some((Fill::Semantic(semantic), format!("\"{keyword}\"")))
                 }
-                None => None,
+                None if materials.is_empty() => None,
+                None => Factor::infer(&leaf).map(|factor| {
+                    let fill = per_draw(factor, materials, &leaf, said);
+                    (fill, format!("\"{}\"", factor.keyword))
+                }),
             };
             match guess {
                 Some((fill, value)) => {
+                    let reason = match &fill {
+                        Fill::Semantic(semantic) => semantic.says().to_owned(),
+                        Fill::PerDraw(all) => factors_said(all),
+                        _ => "lodc chooses it; the original runs at 0".to_owned(),
+                    };
+                    let told = Inference::new(table, &leaf.path, &value);
                     said.inferences
-                        .push(Inference::new(table, &leaf.path, &value));
+                        .push(told.because(format!("{}: {reason}", leaf.type_name())));
                     parts.push((leaf, fill));
                 }
                 None => match given(true) {
@@ -358,6 +421,30 @@ pub(super) fn resolve(
         });
     }
     Ok(buffers)
+}
+
+/// A factor of every draw's material.
+fn per_draw(factor: &'static Factor, materials: &[Material], leaf: &Leaf, said: &mut Said) -> Fill {
+    said.factors.insert(factor.keyword);
+    let all = materials.iter();
+    Fill::PerDraw(all.map(|m| m.numbers(factor, leaf)).collect())
+}
+
+/// The factors of the materials, for a person.
+fn factors_said(all: &[Vec<f64>]) -> String {
+    let mut values: Vec<String> = Vec::new();
+    for numbers in all {
+        let numbers: Vec<String> = numbers.iter().map(|n| (*n as f32).to_string()).collect();
+        let value = numbers.join(", ");
+        if !values.contains(&value) {
+            values.push(value);
+        }
+    }
+    match values.as_slice() {
+        [one] => format!("the material's, {one}"),
+        several if several.len() <= 4 => format!("each material's: {}", several.join("; ")),
+        several => format!("each material's, {} values", several.len()),
+    }
 }
 
 /// Whether a chosen entry point writes to a variable.
@@ -503,7 +590,14 @@ mod tests {
         };
         let file: SceneFile = toml.parse().unwrap();
         let mut said = Said::default();
-        let buffers = resolve(&source(), toml, &file.uniforms, &file.storage, &mut said);
+        let buffers = resolve(
+            &source(),
+            toml,
+            &file.uniforms,
+            &file.storage,
+            &[],
+            &mut said,
+        );
         (buffers, said)
     }
 
@@ -557,7 +651,14 @@ mod tests {
             text: toml,
         };
         let mut said = Said::default();
-        let resolved = resolve(&source(), named, &file.uniforms, &file.storage, &mut said);
+        let resolved = resolve(
+            &source(),
+            named,
+            &file.uniforms,
+            &file.storage,
+            &[],
+            &mut said,
+        );
         let buffers = resolved.unwrap_or_else(|error| panic!("{error}"));
         assert!(said.missing.is_empty());
         let fill = |path: &str| {
@@ -806,7 +907,7 @@ mod tests {
             name: "a.toml",
             text: "",
         };
-        let buffers = resolve(&source, toml, &none, &none, &mut said).unwrap();
+        let buffers = resolve(&source, toml, &none, &none, &[], &mut said).unwrap();
         assert!(said.missing.is_empty());
         assert_eq!(bytes(&buffers[0], 0), [0.0]);
     }
@@ -852,7 +953,7 @@ mod tests {
             };
             let file = toml.parse().unwrap();
             let mut said = Said::default();
-            resolve(&source, toml, &file.uniforms, &file.storage, &mut said).unwrap_err()
+            resolve(&source, toml, &file.uniforms, &file.storage, &[], &mut said).unwrap_err()
         };
         let large = refused(
             "@group(0) @binding(0) var<storage> b: array<f32, 2000000>;",

@@ -6,13 +6,14 @@ use crate::front::Source;
 use crate::front::names::listed;
 use crate::scene::file::{Entries, Node, Toml, suggest};
 use crate::scene::layout::{Layout, Leaf, Place, article};
+use crate::scene::materials::Factor;
 use crate::scene::semantic::Semantic;
 use naga::{AddressSpace, ScalarKind};
 use toml::Spanned;
 
 /// A value that a key of the scene file gives to a part of a buffer.
 pub(super) struct Given<'f> {
-    key: &'f Spanned<String>,
+    pub(super) key: &'f Spanned<String>,
     pub(super) place: Place,
     /// For each leaf of the place, in order.
     pub(super) fills: Vec<(Leaf, Fill)>,
@@ -60,16 +61,19 @@ pub(super) fn read_entry<'f>(
                 .collect()
         }
         Node::Text(keyword) => {
-            let semantic = Semantic::of_keyword(keyword).ok_or_else(|| {
-                let known: Vec<&str> = Semantic::keywords().chain([ZERO]).collect();
+            let meaning = Meaning::of_keyword(keyword).ok_or_else(|| {
+                let known: Vec<&str> = Semantic::keywords()
+                    .chain(Factor::keywords())
+                    .chain([ZERO])
+                    .collect();
                 let error =
                     toml.error(format!("there is no meaning `{keyword}`"), value.span(), "");
                 suggest(error, keyword, &known)
             })?;
             let leaves = layout.leaves(&place, 1);
             match leaves.as_slice() {
-                [leaf] if leaf.path == path && semantic.fits(leaf) => {
-                    vec![(leaf.clone(), Fill::Semantic(semantic))]
+                [leaf] if leaf.path == path && meaning.fits(leaf) => {
+                    vec![(leaf.clone(), meaning.fill())]
                 }
                 _ => {
                     return Err(toml
@@ -78,7 +82,7 @@ pub(super) fn read_entry<'f>(
                             value.span(),
                             format!("it is {}", article(&layout.type_name(place.ty))),
                         )
-                        .with_note(format!("the {keyword} is {}", semantic.wants())));
+                        .with_note(format!("the {keyword} is {}", meaning.wants())));
                 }
             }
         }
@@ -95,6 +99,40 @@ pub(super) fn read_entry<'f>(
         fills,
         is_rest,
     })
+}
+
+/// What a keyword says: a value that the scene computes, or a factor of the object's materials.
+enum Meaning {
+    Semantic(Semantic),
+    Factor(&'static Factor),
+}
+
+impl Meaning {
+    fn of_keyword(keyword: &str) -> Option<Self> {
+        let semantic = Semantic::of_keyword(keyword).map(Self::Semantic);
+        semantic.or_else(|| Factor::of_keyword(keyword).map(Self::Factor))
+    }
+
+    fn fits(&self, leaf: &Leaf) -> bool {
+        match self {
+            Self::Semantic(semantic) => semantic.fits(leaf),
+            Self::Factor(factor) => factor.fits(leaf),
+        }
+    }
+
+    fn wants(&self) -> &'static str {
+        match self {
+            Self::Semantic(semantic) => semantic.wants(),
+            Self::Factor(factor) => factor.wants(),
+        }
+    }
+
+    fn fill(self) -> Fill {
+        match self {
+            Self::Semantic(semantic) => Fill::Semantic(semantic),
+            Self::Factor(factor) => Fill::Factor(factor),
+        }
+    }
 }
 
 /// The part of a buffer that a key names.
