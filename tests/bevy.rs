@@ -72,7 +72,7 @@ fn small_scene(name: &str, resolution: u32) -> PathBuf {
     let text = std::fs::read_to_string(here.join("scenes/bevy_pbr.toml")).expect("it is committed");
     let textures = here.join("materials/textures");
     let small = [
-        ("[128, 128]", format!("[{resolution}, {resolution}]")),
+        ("[96, 96]", format!("[{resolution}, {resolution}]")),
         ("count = 3", "count = 2".to_owned()),
         ("levels = 4", "levels = 3".to_owned()),
         ("../materials/textures", textures.display().to_string()),

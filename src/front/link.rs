@@ -158,19 +158,17 @@ impl<'a> Linker<'a> {
                     *size = self.global_expression(*size)?;
                 }
             }
-            for variable in [&mut linked.task_payload, &mut linked.incoming_ray_payload] {
-                if let Some(variable) = variable {
-                    *variable = self.global(*variable)?;
-                }
+            let payloads = [&mut linked.task_payload, &mut linked.incoming_ray_payload];
+            for variable in payloads.into_iter().flatten() {
+                *variable = self.global(*variable)?;
             }
             if let Some(mesh) = &mut linked.mesh_info {
-                for size in [
+                let sizes = [
                     &mut mesh.max_vertices_override,
                     &mut mesh.max_primitives_override,
-                ] {
-                    if let Some(size) = size {
-                        *size = self.global_expression(*size)?;
-                    }
+                ];
+                for size in sizes.into_iter().flatten() {
+                    *size = self.global_expression(*size)?;
                 }
                 mesh.vertex_output_type = self.ty(mesh.vertex_output_type)?;
                 mesh.primitive_output_type = self.ty(mesh.primitive_output_type)?;

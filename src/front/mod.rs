@@ -194,9 +194,9 @@ impl Source {
                 place,
             })
             .collect();
-        let mut module = link::link(&linked).map_err(|clash| self.clash(&clash))?;
+        let module = link::link(&linked).map_err(|clash| self.clash(&clash))?;
         #[cfg(feature = "imports")]
-        imports::demangle(&mut module);
+        let module = imports::demangled(module);
         self.info = validate(&module).map_err(|error| parse::invalid(&self, &error))?;
         self.module = module;
         let mut stages = stages.clone();

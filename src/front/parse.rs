@@ -225,11 +225,14 @@ pub(super) fn invalid(source: &Source, error: &WithSpan<ValidationError>) -> Box
     }
 }
 
+/// Puts a diagnostic at a span, with a remark.
+type Placing<'a> = dyn Fn(Box<Diagnostic>, Span, &str) -> Box<Diagnostic> + 'a;
+
 /// What naga's validator refuses, and the name of what it is about.
 fn invalid_at(
     error: &WithSpan<ValidationError>,
     located: &dyn Fn(Box<Diagnostic>) -> Box<Diagnostic>,
-    place: &dyn Fn(Box<Diagnostic>, Span, &str) -> Box<Diagnostic>,
+    place: &Placing<'_>,
 ) -> (Box<Diagnostic>, Option<String>) {
     // The outermost says which function, the innermost what is wrong.
     let mut reasons = Vec::new();

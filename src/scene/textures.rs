@@ -972,7 +972,7 @@ fn no_image(
 ) -> Box<Diagnostic> {
     let value = kind.example();
     let remark = match sampled_in(source, handle) {
-        Some(line) => format!("sampled in line {line}"),
+        Some(at) => format!("sampled in {at}"),
         None => "without an image".to_owned(),
     };
     let warning = Diagnostic::warning(format!(
@@ -985,23 +985,29 @@ fn no_image(
         ))
 }
 
-/// The first line in which a texture is read by its own name.
-fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<u32> {
+/// The first line in which a texture is read by its own name, with its file's name when that is not the shader's own.
+fn sampled_in(source: &Source, texture: Handle<GlobalVariable>) -> Option<String> {
     let module = &source.module;
     let functions = module.functions.iter().map(|(_, f)| f);
     let all = functions.chain(module.entry_points.iter().map(|e| &e.function));
-    all.flat_map(|function| {
+    let places = all.flat_map(|function| {
         function.expressions.iter().filter_map(|(handle, expression)| {
             let image = match expression {
                 Expression::ImageSample { image, .. } | Expression::ImageLoad { image, .. } => *image,
                 _ => return None,
             };
             let own = matches!(function.expressions[image], Expression::GlobalVariable(g) if g == texture);
-            let place = source.place(function.expressions.get_span(handle)).filter(|_| own)?;
-            Some(place.line())
+            source.place(function.expressions.get_span(handle)).filter(|_| own)
         })
+    });
+    let first = places.min_by_key(|place| (place.file.start, place.range.start))?;
+    let file = Path::new(first.file.name)
+        .file_name()
+        .filter(|_| !first.is_in_main());
+    Some(match file {
+        Some(file) => format!("{}:{}", file.display(), first.line()),
+        None => format!("line {}", first.line()),
     })
-    .min()
 }
 
 /// The line that gives a texture its image, and its type.

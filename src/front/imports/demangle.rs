@@ -75,9 +75,9 @@ pub(super) fn readable(message: &str) -> String {
     out + rest
 }
 
-/// Gives everything in a module the name that it was written with.
-pub(in crate::front) fn demangle(module: &mut Module) {
-    let names = plain_names(module);
+/// A module in which everything has the name that it was written with.
+pub(in crate::front) fn demangled(mut module: Module) -> Module {
+    let names = plain_names(&module);
     let plain = |name: &mut Option<String>| {
         if let Some(name) = name
             && let Some(plain) = names.get(name)
@@ -109,6 +109,7 @@ pub(in crate::front) fn demangle(module: &mut Module) {
     for entry in &mut module.entry_points {
         local_names(&mut entry.function);
     }
+    module
 }
 
 /// A local that is called like something imported was mangled too.
@@ -167,22 +168,18 @@ fn plain_names(module: &Module) -> BTreeMap<String, String> {
     for (item, of) in shared {
         for (name, path) in of {
             let parts: Vec<&str> = path.split("::").collect();
-            let longer = (1..=parts.len()).map(|n| {
-                let from = parts.len() - n;
-                let path = parts[from..].join("_");
-                let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
-                format!(
-                    "{}_{item}",
-                    path.chars()
-                        .map(plain)
-                        .collect::<String>()
-                        .trim_matches('_')
-                )
-            });
-            let mut wish = longer
-                .clone()
-                .find(|wish| !taken.contains(wish) && is_free(wish))
-                .unwrap_or_else(|| longer.last().unwrap_or_else(|| item.clone()));
+            let longer: Vec<String> = (0..parts.len())
+                .rev()
+                .map(|from| {
+                    let path = parts[from..].join("_");
+                    let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
+                    let path: String = path.chars().map(plain).collect();
+                    format!("{}_{item}", path.trim_matches('_'))
+                })
+                .collect();
+            let free = |wish: &&String| !taken.contains(*wish) && is_free(wish);
+            let wish = longer.iter().find(free).or(longer.last());
+            let mut wish = wish.unwrap_or(&item).clone();
             while taken.contains(&wish) {
                 wish.push_str("_other");
             }
@@ -238,8 +235,7 @@ mod tests {
              fn {c}(x: f32) -> f32 {{ return x; }} fn {d}(x: f32) -> f32 {{ let {c} = x; return {c}; }}
              fn shade(x: f32) -> f32 {{ return {a}({b}({c}({d}(x)))); }}"
         );
-        let mut module = naga::front::wgsl::parse_str(&text).unwrap();
-        demangle(&mut module);
+        let module = demangled(naga::front::wgsl::parse_str(&text).unwrap());
         let names: Vec<_> = module
             .functions
             .iter()

@@ -13,7 +13,7 @@ mod library;
 mod refusal;
 mod spans;
 
-pub(super) use demangle::demangle;
+pub(super) use demangle::demangled;
 
 use super::modules::{Modules, Value};
 use super::{OtherFile, parse};
@@ -100,13 +100,14 @@ fn compose_one(
     let mut definitions = definitions.clone();
     definitions.extend(own);
     let make = |composer: &mut Composer| {
-        composer.make_naga_module(NagaModuleDescriptor {
+        let made = composer.make_naga_module(NagaModuleDescriptor {
             source: main.text,
             file_path: main.name,
             shader_type: ShaderType::Wgsl,
             shader_defs: definitions.clone(),
             additional_imports: &[],
-        })
+        });
+        made.map_err(Box::new)
     };
     let module = match make(composer) {
         // What is not valid is said by whoever validates the linked module, at its place.

@@ -94,10 +94,11 @@ pub(super) fn split(range: Range<usize>) -> (usize, Range<usize>) {
 pub(super) fn preprocessed(text: &str, definitions: &Definitions) -> String {
     let preprocessor = Preprocessor::default();
     let plain = with_plain_lines(text);
-    preprocessor
-        .extract_wgsl_directives(&plain)
-        .and_then(|(text, _)| preprocessor.preprocess(&text, definitions))
-        .map_or_else(|_| String::new(), |done| done.preprocessed_source)
+    let Ok((text, _)) = preprocessor.extract_wgsl_directives(&plain) else {
+        return String::new();
+    };
+    let done = preprocessor.preprocess(&text, definitions);
+    done.map_or_else(|_| String::new(), |done| done.preprocessed_source)
 }
 
 /// A module's text as the preprocessor leaves it.
