@@ -139,7 +139,16 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
         &source.fragment,
         EXPRESSION_LIMIT,
     )
-    .map_err(|error| source.error(error.message, error.span, "here"))
+    .map_err(|error| {
+        let too_large = error.message.contains("grows beyond");
+        let located = source.error(error.message, error.span, "here");
+        match too_large {
+            true => located.with_note(
+                "calls are copied into their callers: call it in fewer places, or in a loop",
+            ),
+            false => located,
+        }
+    })
 }
 
 /// Emits from the lock, without a search: what `--locked` and a build script do. Warnings come beside the files: a

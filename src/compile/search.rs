@@ -2,7 +2,10 @@
 
 use super::{Files, Request, normal_form, relative};
 use crate::emit::{self, EmitLevel, Lock, Output, figure};
+use crate::eval::draw::shade;
+use crate::eval::machine::MAX_ROUNDS;
 use crate::eval::program::Program;
+use crate::eval::raster::rasterize;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
 use crate::scene::{Reading, Scene};
@@ -23,6 +26,9 @@ pub struct Compiled {
     /// What should be known, located.
     pub warnings: Vec<Box<Diagnostic>>,
 }
+
+/// Squares of 2 x 2 pixels that are drawn to see whether the shader's loops end.
+const TRIED: usize = 64;
 
 /// Everything that a search stands on.
 struct Ready {
@@ -79,6 +85,35 @@ impl Ready {
     }
 }
 
+impl Ready {
+    /// Draws some of the first frame, since a loop that does not end would be run for every pixel of all frames.
+    fn ends(&self, vertex: &Program) -> Result<()> {
+        let fragment = self.base.index(Stage::Fragment).unwrap_or(0);
+        let fragment = Program::compile(self.base.module(), fragment, &[])
+            .map_err(|refused| refused.at(&self.source))?;
+        let Some(frame) = self.scene.frames(self.scene.nearest).into_iter().next() else {
+            return Ok(());
+        };
+        let coverage = rasterize(vertex, &fragment, &frame);
+        let squares = coverage.squares();
+        let apart = squares.len().div_ceil(TRIED).max(1);
+        let tried: BTreeSet<_> = squares.into_iter().step_by(apart).collect();
+        let some = coverage.part(|square| tried.contains(&square));
+        let profile = shade(&fragment, &some, &frame.bindings).profile;
+        match profile.endless {
+            None => Ok(()),
+            Some(span) => Err(self
+                .source
+                .error(
+                    format!("the loops of a pixel go on for more than {MAX_ROUNDS} rounds"),
+                    span,
+                    "stopped here",
+                )
+                .with_note("let it end earlier, such as `for (var i = 0; i < 64; i++)`, or give a uniform that it depends on another value in the scene")),
+        }
+    }
+}
+
 /// Compiles a material shader: searches its levels, and makes the files that hold them.
 ///
 /// # Errors
@@ -86,6 +121,7 @@ impl Ready {
 pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Result<Compiled> {
     let ready = Ready::read(request)?;
     let vertex = ready.vertex()?;
+    ready.ends(&vertex)?;
     let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     // What cannot be written should be known before a search that takes a minute.
     let emission = request.emission(Output::default());
@@ -341,6 +377,7 @@ fn averaged<'a>(base: &'a Shader, recipe: &'a Recipe) -> impl Iterator<Item = St
 pub fn inspect(request: &Request) -> Result<String> {
     let ready = Ready::read(request)?;
     let vertex = ready.vertex()?;
+    ready.ends(&vertex)?;
     let stand = Stand {
         base: &ready.base,
         vertex: &vertex,

@@ -144,7 +144,10 @@ pub(super) fn parse(name: &str, text: &str, language: Language) -> Result<(Modul
         return Err(Diagnostic::error(format!(
             "`{name}` has {} bytes, more than the {LARGEST} that lodc reads",
             text.len()
-        )));
+        ))
+        .with_note(
+            "leave out what its entry points do not use, or compile its materials one by one",
+        ));
     }
     on_deep_stack(name, || parse_here(name, text, language))
 }
@@ -181,16 +184,46 @@ fn parse_here(name: &str, text: &str, language: Language) -> Result<(Module, Mod
     Ok((module, info))
 }
 
+/// Where the most brackets are open in a text, comments and all.
+fn deepest(text: &str) -> usize {
+    let (mut depth, mut most, mut place) = (0, 0, 0);
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            b'(' | b'[' | b'<' => depth += 1,
+            b')' | b']' | b'>' => depth -= 1,
+            b';' | b'{' | b'}' => depth = 0,
+            _ => {}
+        }
+        if depth > most {
+            (most, place) = (depth, at);
+        }
+    }
+    place
+}
+
 fn wgsl(name: &str, text: &str) -> Result<Module> {
     naga::front::wgsl::parse_str(text).map_err(|error| {
         if let Some(foreign) = foreign_directive(name, text) {
             return foreign;
         }
+        if error.notes().any(|note| note.contains("recursion limit")) {
+            let place = deepest(text);
+            return Diagnostic::error("brackets are nested deeper than lodc reads")
+                .with_source(name, text)
+                .with_label(place..place + 1, "the deepest is here")
+                .with_note(
+                    "name a part of it first: `let part = ...;`, or `alias Part = ...;` for a type",
+                );
+        }
         let located = Diagnostic::error(uncapitalised(error.message())).with_source(name, text);
         let labelled = error
             .labels()
             .fold(located, |d, (span, remark)| at(d, span, remark));
-        error.notes().fold(labelled, |d, note| d.with_reason(note))
+        let noted = error.notes().fold(labelled, |d, note| d.with_reason(note));
+        match error.message().contains("nesting limit") {
+            true => noted.with_note("put the inner blocks into a function of their own"),
+            false => noted,
+        }
     })
 }
 

@@ -18,7 +18,7 @@ use super::program::code::{Case, Instruction, Register, Step};
 use super::texture::{Sampler, Texture};
 use lodc_passes::Work;
 use lodc_passes::semantics::{Kind, words};
-use naga::ScalarKind;
+use naga::{ScalarKind, Span};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ use kernels::{Registers, Vectors};
 
 /// Rounds of all loops together that a block may take; a shader that wants more is taken to
 /// never end.
-const MAX_ROUNDS: u32 = 1 << 18;
+pub const MAX_ROUNDS: u32 = 1 << 18;
 
 /// What is bound at a group and binding.
 #[derive(Clone, Debug)]
@@ -70,6 +70,8 @@ pub struct Profile {
     /// Covered lanes that were still in a loop when it was stopped because it does not seem to end. Their
     /// outputs are NaN and 0.
     pub ran_away: u64,
+    /// The loop that was stopped first.
+    pub endless: Option<Span>,
 }
 
 impl Profile {
@@ -78,6 +80,7 @@ impl Profile {
         self.lanes += later.lanes;
         self.work += later.work;
         self.ran_away += later.ran_away;
+        self.endless = self.endless.or(later.endless);
         if self.probes.is_empty() {
             self.probes.clone_from(&later.probes);
             return;
@@ -161,6 +164,7 @@ pub struct Machine<'a, R = f32> {
     discarded: Mask,
     ran_away: Mask,
     rounds: u32,
+    endless: Option<Span>,
     counts: Vec<u64>,
     lanes: u64,
     lost: u64,
@@ -243,6 +247,7 @@ impl<'a, R: Lane> Machine<'a, R> {
             discarded: Mask::default(),
             ran_away: Mask::default(),
             rounds: 0,
+            endless: None,
             counts: vec![0; program.work.len()],
             lanes: 0,
             lost: 0,
@@ -343,6 +348,7 @@ impl<'a, R: Lane> Machine<'a, R> {
             work,
             probes: self.probes.clone(),
             ran_away: self.lost,
+            endless: self.endless,
         }
     }
 
@@ -420,6 +426,9 @@ impl<'a, R: Lane> Machine<'a, R> {
                 while !self.mask.is_empty() {
                     if self.rounds == MAX_ROUNDS {
                         self.ran_away = self.ran_away.or(self.mask);
+                        let mut loops = self.program.loops.iter();
+                        let this = loops.find(|(known, _)| known == label);
+                        self.endless = self.endless.or(this.map(|(_, span)| *span));
                         self.leave(*label);
                         break;
                     }

@@ -3,7 +3,7 @@
 
 use lodc_passes::Work;
 use lodc_passes::semantics::{Kind, Op};
-use naga::{DerivativeAxis, ScalarKind};
+use naga::{DerivativeAxis, ScalarKind, Span};
 
 /// A scalar value, by its place in [`Ir::values`].
 pub(super) type Id = u32;
@@ -149,6 +149,8 @@ pub(super) struct Ir {
     /// The components of each probe.
     pub(super) probes: Vec<usize>,
     pub(super) discards: bool,
+    /// Where the loop of each label is.
+    pub(super) loops: Vec<(Label, Span)>,
 }
 
 impl Ir {

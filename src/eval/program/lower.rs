@@ -1092,6 +1092,7 @@ impl<'a> Lowering<'a> {
     ) -> Result<(), Refused> {
         let label = self.label();
         let next = self.label();
+        self.ir.loops.push((label, self.span));
         self.count();
         self.settle();
         self.frame.breaks.push(label);

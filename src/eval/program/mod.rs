@@ -37,6 +37,8 @@ pub struct Program {
     pub(super) samplers: Vec<(u32, u32)>,
     /// The components of each probe.
     pub(super) probes: Vec<usize>,
+    /// Where the loop of each label is.
+    pub(super) loops: Vec<(u32, Span)>,
 }
 
 /// One scalar component of an entry point's input or output.
@@ -106,6 +108,7 @@ impl Program {
             textures: ir.textures,
             samplers: ir.samplers,
             probes: ir.probes,
+            loops: ir.loops,
         })
     }
 

@@ -308,14 +308,16 @@ pub(super) fn resolve(
         let runtime = own().map(|g| g.place.runtime).max().unwrap_or(0);
         let size = layout.size(variable.ty, runtime);
         if size > LARGEST {
-            return Err(source.error(
-                format!(
-                    "the buffer `{}` has {size} bytes, and at most {LARGEST} are evaluated",
-                    root.path
-                ),
-                source.variable(handle),
-                "",
-            ));
+            return Err(source
+                .error(
+                    format!(
+                        "the buffer `{}` has {size} bytes, and at most {LARGEST} are evaluated",
+                        root.path
+                    ),
+                    source.variable(handle),
+                    "",
+                )
+                .with_note("declare a shorter array, or keep what is read of it in a texture"));
         }
         let mut used = Used::of(source, handle);
         if is_written(source, handle) {
