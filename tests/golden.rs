@@ -127,6 +127,10 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                     *deviation = [0.0; 4];
                 }
             }),
+            ["dynamic", path] => {
+                facts.dynamic.insert(path.into());
+                Some(())
+            }
             [path, "unseen"] => facts.values.remove(&id(shader, path)).map(drop),
             [path, ..] => facts
                 .values

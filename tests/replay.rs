@@ -146,7 +146,17 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
             if candidates.is_empty() {
                 break;
             }
-            let candidate = &candidates[random.below(candidates.len())];
+            let mut candidate = candidates[random.below(candidates.len())].clone();
+            // A search changes numbers for better ones.
+            let pass = recipe::pass(&candidate.pass).expect("passes offer under their own names");
+            let numbers: Vec<f32> = candidate.numbers().map(|n| n * 0.75 + 0.125).collect();
+            if random.below(4) == 0
+                && let Some(better) = pass.with_numbers(&candidate, &numbers)
+                && pass.applies(&shader, &better).is_ok()
+            {
+                candidate = better;
+            }
+            let candidate = &candidate;
             shader = step(&subject.name, &shader, candidate).unwrap_or_else(|declined| {
                 panic!("{}: {candidate} was offered, but {declined}", subject.name)
             });
@@ -227,6 +237,9 @@ fn any_candidate_can_be_asked_of_any_shader() {
         "keep fs_main",
         "mean",
         "without",
+        "best",
+        "fit fs_main",
+        "fit-within fs_main",
         "seen-mean",
         "no such word",
     ];
@@ -295,7 +308,7 @@ fn two_orders_of_independent_edits_are_one_variant() {
 }
 
 /// Pairs of edits, each with a shader, whose two orders gave two variants once.
-const ONCE_TWO_VARIANTS: [(&str, [&str; 3], [&str; 3], Orders); 7] = [
+const ONCE_TWO_VARIANTS: [(&str, [&str; 3], [&str; 3], Orders); 6] = [
     // The second makes a read equal to the first one's, and so one value of two.
     (
         "drops_shadow_comparison",
@@ -305,24 +318,21 @@ const ONCE_TWO_VARIANTS: [(&str, [&str; 3], [&str; 3], Orders); 7] = [
     ),
     // A part of the `if` becomes a selection, which asks for the same test.
     (
-        "private_globals",
-        ["op-removal", "state.seed.mul", "mean = 1"],
-        ["op-removal", "maybe_next.if.less", "reject"],
-        Orders::Both,
+        "returned_values",
+        ["op-removal", "sphere.result.found.greater", "reject"],
+        [
+            "op-removal",
+            "nearer_2.result.normal_3",
+            "keep fs_main.nearer_2.result.normal",
+        ],
+        Orders::One,
     ),
     // A switch with one case is kept for a `break`, and the `break` goes.
     (
         "switches",
-        ["op-removal", "kind.floor", "mean = 0"],
+        ["op-removal", "kind.mul", "mean = 0.5"],
         ["op-removal", "pick.if.greater", "accept"],
         Orders::Both,
-    ),
-    // The operand is a constant now, and another one has its hash.
-    (
-        "shadowed_names",
-        ["op-removal", "f.z_4.float", "mean = 2"],
-        ["op-removal", "f.z_4.mul", "keep fs_main.f.z_4.float"],
-        Orders::One,
     ),
     // A load becomes a value that is stored, too.
     (

@@ -5,7 +5,7 @@
 
 use crate::recipe::Declined;
 use crate::shader::ValueId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the samples of a scene showed, at one distance.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,6 +14,10 @@ pub struct Facts {
     pub values: BTreeMap<ValueId, ValueFacts>,
     /// For each texture, by the name of its global variable; a texture that is not here is dynamic.
     pub textures: BTreeMap<String, TextureFacts>,
+    /// The uniforms that may take any value, by their paths, such as `lights.items[2].colour`.
+    pub dynamic: BTreeSet<String>,
+    /// For values and operands of theirs, how the one goes with the other: for each of the value's components.
+    pub pairs: BTreeMap<(ValueId, ValueId), Vec<Moments>>,
 }
 
 /// What was seen of one value, component by component, over active lanes of covered pixels.
@@ -63,6 +67,68 @@ impl Facts {
         } else {
             Err(Declined("its mean over the samples is not finite".into()))
         }
+    }
+}
+
+/// Means and central second moments of two numbers that are seen together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// How often they were seen.
+    pub count: u64,
+    /// The mean of each.
+    pub mean: [f64; 2],
+    /// The sum of the squared differences of each from its mean.
+    pub squares: [f64; 2],
+    /// The sum of the products of these differences.
+    pub product: f64,
+}
+
+impl Moments {
+    /// Takes in another pair (Welford, "Note on a method for calculating corrected sums of squares and products",
+    /// 1962).
+    pub fn add(&mut self, pair: [f64; 2]) {
+        self.count += 1;
+        let part = 1.0 / self.count as f64;
+        let before = [0, 1].map(|i| pair[i] - self.mean[i]);
+        for i in 0..2 {
+            self.mean[i] += before[i] * part;
+            self.squares[i] += before[i] * (pair[i] - self.mean[i]);
+        }
+        self.product += before[0] * (pair[1] - self.mean[1]);
+    }
+
+    /// Adds what was seen elsewhere (Chan, Golub, LeVeque, "Updating formulae and a pairwise algorithm for computing
+    /// sample variances", 1979).
+    pub fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        let count = self.count + other.count;
+        let part = other.count as f64 / count as f64;
+        let apart = [0, 1].map(|i| other.mean[i] - self.mean[i]);
+        let weight = self.count as f64 * part;
+        for i in 0..2 {
+            self.mean[i] += apart[i] * part;
+            self.squares[i] += other.squares[i] + apart[i] * apart[i] * weight;
+        }
+        self.product += other.product + apart[0] * apart[1] * weight;
+        self.count = count;
+    }
+
+    /// The scale and the offset with which the second number comes closest to the first one, in least squares;
+    /// `None` when the second does not vary.
+    pub fn line(&self) -> Option<[f64; 2]> {
+        let scale = self.product / self.squares[1];
+        let offset = self.mean[0] - scale * self.mean[1];
+        (self.squares[1] > 0.0 && scale.is_finite() && offset.is_finite())
+            .then_some([scale, offset])
+    }
+
+    /// The mean squared error of the first number when a line through the second stands for it.
+    pub fn error_of(&self, [scale, offset]: [f64; 2]) -> f64 {
+        let shift = self.mean[0] - scale * self.mean[1] - offset;
+        let spread = self.squares[0] - 2.0 * scale * self.product + scale * scale * self.squares[1];
+        spread.max(0.0) / self.count.max(1) as f64 + shift * shift
     }
 }
 
@@ -185,6 +251,44 @@ mod tests {
             assert_eq!(texture.mean_at_level(), Ok([mean; 4]), "level {level}");
         }
         assert!(TextureFacts::default().mean_at_level().is_err());
+    }
+
+    #[test]
+    fn moments_give_the_line_and_merge() {
+        let pairs = [
+            [1.0, 1e6],
+            [3.0, 1e6 + 1.0],
+            [4.0, 1e6 + 2.0],
+            [8.0, 1e6 + 4.0],
+        ];
+        let mut whole = Moments::default();
+        let mut halves = [Moments::default(); 2];
+        for (i, pair) in pairs.into_iter().enumerate() {
+            whole.add(pair);
+            halves[i / 2].add(pair);
+        }
+        let [mut merged, other] = halves;
+        merged.merge(&other);
+        merged.merge(&Moments::default());
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-6 * a.abs().max(1.0), "{a} {b}");
+        assert_eq!(merged.count, 4);
+        close(merged.product, whole.product);
+        close(merged.squares[0], whole.squares[0]);
+        close(merged.squares[1], whole.squares[1]);
+        // By hand: means 4 and 1.75 (+ 1e6), products 15, squares 26 and 8.75.
+        let [scale, offset] = whole.line().expect("the second varies");
+        close(scale, 15.0 / 8.75);
+        close(offset + scale * 1e6, 4.0 - 1.75 * 15.0 / 8.75);
+        close(
+            whole.error_of([scale, offset]),
+            (26.0 - 15.0 * 15.0 / 8.75) / 4.0,
+        );
+        close(whole.error_of([0.0, 4.0]), 26.0 / 4.0);
+        close(whole.error_of([0.0, 5.0]), 26.0 / 4.0 + 1.0);
+        let mut still = Moments::default();
+        still.add([1.0, 2.0]);
+        still.add([2.0, 2.0]);
+        assert_eq!(still.line(), None);
     }
 
     #[test]

@@ -40,6 +40,15 @@ impl Candidate {
         self.value.iter().map(|bits| f32::from_bits(*bits))
     }
 
+    /// The same candidate with another choice and other numbers.
+    pub(crate) fn with(&self, choice: &str, numbers: &[f32]) -> Self {
+        Self {
+            choice: choice.into(),
+            value: numbers.iter().map(|number| number.to_bits()).collect(),
+            ..self.clone()
+        }
+    }
+
     /// The same candidate with its values named as in another version of their shader.
     fn known_to(&self, base: &Shader) -> Self {
         let word = |word: &str| match base.known_as(&word.into()) {
@@ -133,6 +142,11 @@ pub trait Pass: Sync {
             .filter(|considered| considered.declined.is_none())
             .map(|considered| considered.candidate)
             .collect()
+    }
+    /// The same change with other numbers, of which there are as many, and with the choice that these have: a mean
+    /// becomes the best constant. `None` when its numbers mean what they are, or it has none.
+    fn with_numbers(&self, _candidate: &Candidate, _numbers: &[f32]) -> Option<Candidate> {
+        None
     }
     /// Whether a candidate can be applied to a shader.
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined>;

@@ -7,6 +7,7 @@
 //! Effect. The read's users use a constant that the candidate carries. `seen-mean`: the mean of what
 //! the read returned over the samples of the scene. `texture-mean`: the mean of the whole texture, at
 //! the MIP level that the distance leads to. `only-colour`: the same, of a texture that has one colour.
+//! `best`: the constant that leaves the least error on the screen; a search makes it of a mean that is worth it.
 //! At a texture's variable every read becomes the same constant, so that the texture is not needed any
 //! more, where each removal alone would still pay for the others; `seen-mean` is then the mean over all
 //! reads. The variable's own id is the site, such as `fs_main.albedo_texture`.
@@ -18,6 +19,8 @@
 //! Declines.
 //! - A texture that the facts do not know: it is dynamic, and may hold anything.
 //! - Integer textures: their numbers name things, and things have no mean.
+//! - A read that is only compared or made an integer, for a mean; one at a place that depends on what may take
+//!   any value, for `seen-mean`.
 //! - `texture-mean` for a gather or a depth comparison, whose result is no mix of texels, and for an
 //!   array of textures.
 //! - A read that decides when a loop ends (unless a counter of integers ends it anyway), a built-in
@@ -28,7 +31,7 @@
 //! 2003, section 2.1.
 
 use crate::edit::{Edit, New};
-use crate::flow::{Flow, Value};
+use crate::flow::{Dynamic, Flow, Value};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
 use crate::{Facts, constants};
@@ -45,13 +48,15 @@ pub struct TextureRemoval;
 enum Choice {
     SeenMean,
     TextureMean,
+    Best,
     OnlyColour,
 }
 
 impl Choice {
-    const ALL: [(Self, &'static str); 3] = [
+    const ALL: [(Self, &'static str); 4] = [
         (Self::SeenMean, "seen-mean"),
         (Self::TextureMean, "texture-mean"),
+        (Self::Best, "best"),
         (Self::OnlyColour, "only-colour"),
     ];
 
@@ -79,7 +84,7 @@ pub fn deviation(shader: &Shader, facts: &Facts, candidate: &Candidate) -> Optio
         return None;
     }
     match Choice::parse(&candidate.choice).ok()? {
-        Choice::SeenMean => None,
+        Choice::SeenMean | Choice::Best => None,
         Choice::OnlyColour => Some([0.0; 4]),
         Choice::TextureMean => {
             let (stage, site) = shader.find(&candidate.site)?;
@@ -113,7 +118,11 @@ impl Pass for TextureRemoval {
         let Some(flow) = Flow::new(shader, STAGE) else {
             return Vec::new();
         };
-        let survey = Survey { flow: &flow, facts };
+        let survey = Survey {
+            flow: &flow,
+            facts,
+            dynamic: Dynamic::of(&flow, facts),
+        };
         let mut found = Vec::new();
         for (site, _) in flow.function.expressions.iter() {
             if let Some(image) = image(&flow, site) {
@@ -133,6 +142,13 @@ impl Pass for TextureRemoval {
             }
         }
         found
+    }
+
+    fn with_numbers(&self, candidate: &Candidate, numbers: &[f32]) -> Option<Candidate> {
+        match Choice::parse(&candidate.choice).ok()? {
+            Choice::OnlyColour => None,
+            _ => Some(candidate.with(Choice::Best.word(), numbers)),
+        }
     }
 
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
@@ -233,9 +249,15 @@ fn removable(flow: &Flow, reads: &[Value], choice: Choice) -> Result<usize, Decl
         }));
     };
     let first_kind = kind(flow, *first);
+    let of_texture = matches!(choice, Choice::TextureMean | Choice::OnlyColour);
     for read in reads {
         if let Some(why) = flow.decides(*read) {
             return Err(Declined(why.to_string()));
+        }
+        if choice != Choice::OnlyColour
+            && let Some(meaning) = flow.meaning(*read)
+        {
+            return Err(meaning.into());
         }
         if flow.floats(*read) != flow.floats(*first) || kind(flow, *read) != first_kind {
             return Err(Declined("it is read in different ways".into()));
@@ -244,11 +266,11 @@ fn removable(flow: &Flow, reads: &[Value], choice: Choice) -> Result<usize, Decl
             image(flow, *read).map(|image| &flow.function.expressions[image]),
             Some(Expression::GlobalVariable(_))
         );
-        if choice != Choice::SeenMean && !whole {
+        if of_texture && !whole {
             return Err(Declined("it is one of an array of textures".into()));
         }
     }
-    if choice != Choice::SeenMean && first_kind != Kind::Texels {
+    if of_texture && first_kind != Kind::Texels {
         return Err(Declined("it returns no mix of texels".into()));
     }
     Ok(flow.floats(*first).unwrap_or(1))
@@ -258,6 +280,7 @@ fn removable(flow: &Flow, reads: &[Value], choice: Choice) -> Result<usize, Decl
 struct Survey<'a> {
     flow: &'a Flow<'a>,
     facts: &'a Facts,
+    dynamic: Dynamic,
 }
 
 impl Survey<'_> {
@@ -282,6 +305,12 @@ impl Survey<'_> {
                 })?;
                 let mean = match choice {
                     Choice::SeenMean => {
+                        if reads.iter().any(|read| self.dynamic.is(*read)) {
+                            return Err(Declined(
+                                "where it is read depends on something that may take any value"
+                                    .into(),
+                            ));
+                        }
                         let ids = reads.iter().map(|read| self.flow.id(*read));
                         self.facts.mean(ids, count)?
                     }

@@ -37,7 +37,9 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             .to_owned()
     };
     let mut means = Vec::new();
+    let mut constants = Vec::new();
     let mut kept = Vec::new();
+    let mut fitted = Vec::new();
     let mut without = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
@@ -49,6 +51,11 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             }
             None if candidate.choice == "without" => without.push(site),
             None if candidate.choice.rsplit('-').next() == Some("mean") => means.push(site),
+            None if candidate.choice == "best" => constants.push(site),
+            Some(("fit" | "fit-within", operand)) => {
+                let operand = ValueId::from(operand);
+                fitted.push(format!("{site} fitted to {}", short(operand.path())));
+            }
             _ => others.push(format!("{site}: {}", candidate.choice)),
         }
     }
@@ -61,12 +68,24 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             listed(several, "values")
         )),
     }
+    match &*constants {
+        [] => {}
+        [one] => clauses.push(format!("{one} replaced by a constant")),
+        several => clauses.push(format!(
+            "{} replaced by constants",
+            listed(several, "values")
+        )),
+    }
     if !without.is_empty() {
         clauses.push(format!("{} left out", listed(&without, "values")));
     }
     match kept.len() {
         0..=2 => clauses.append(&mut kept),
         n => clauses.push(format!("{n} operations keep one operand")),
+    }
+    match fitted.len() {
+        0..=2 => clauses.append(&mut fitted),
+        n => clauses.push(format!("{n} operations fitted to an operand")),
     }
     match others.len() {
         0..=2 => clauses.append(&mut others),
@@ -109,10 +128,12 @@ mod tests {
             ),
             candidate("texture-removal", "main.albedo", "texture-mean"),
             candidate("op-removal", "main.ambient", "without"),
+            candidate("op-removal", "main.sky", "best"),
+            candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; ambient left out; specular.mul keeps specular.pow"
+            "normal_map and albedo replaced by their means; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }

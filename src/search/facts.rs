@@ -1,13 +1,14 @@
 //! Facts: what the samples of a scene show of the values of a shader, and what is known of its textures, at one
 //! distance.
 
-use super::samples::{SampleSet, compile};
+use super::samples::SampleSet;
 use crate::eval::draw::{Shading, shade_into};
+use crate::eval::program::Program;
 use crate::eval::texture::{Dimension, Texture};
-use crate::scene::{Scene, SceneTexture};
+use crate::scene::{Scene, SceneTexture, Variation};
 use glam::{Vec2, Vec3};
-use lodc_passes::facts::{TextureFacts, ValueFacts};
-use lodc_passes::{Facts, Shader, Stage, autolod};
+use lodc_passes::facts::{Moments, TextureFacts, ValueFacts};
+use lodc_passes::{Facts, Shader, Stage, autolod, op_removal};
 use naga::{Expression, Handle, Scalar, TypeInner};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -16,12 +17,19 @@ use std::sync::Arc;
 impl SampleSet<'_> {
     /// What the samples show of every float value of a shader, and of the scene's textures.
     pub fn facts(&self, shader: &Shader) -> Facts {
+        let uniforms = self.stand.scene.uniforms.iter();
+        let dynamic = uniforms.filter(|uniform| uniform.variation == Variation::Dynamic);
         let mut facts = Facts {
-            values: BTreeMap::new(),
             textures: texture_facts(self.stand.scene, self.distance()),
+            dynamic: dynamic.map(|uniform| uniform.path.clone()).collect(),
+            ..Facts::default()
         };
         let probes = float_values(shader);
-        let Ok(program) = compile(shader, &probes) else {
+        let pairs = op_removal::pairs(shader);
+        // A shader always has a fragment stage.
+        let entry = shader.index(Stage::Fragment).unwrap_or(0);
+        let compiled = Program::compile_with_pairs(shader.module(), entry, &probes, &pairs);
+        let Ok(program) = compiled else {
             return facts;
         };
         let profiles: Vec<_> = self
@@ -32,9 +40,21 @@ impl SampleSet<'_> {
                 let mut shading = Shading::default();
                 let seen = drawing.seen.as_ref().unwrap_or(&drawing.coverage);
                 shade_into(&program, seen, &frame.bindings, &mut shading);
-                shading.profile.probes
+                (shading.profile.probes, shading.profile.pairs)
             })
             .collect();
+        let id = |value| shader.id(Stage::Fragment, value).clone();
+        for (i, (value, operand)) in pairs.into_iter().enumerate() {
+            let mut seen: Vec<Moments> = Vec::new();
+            for (_, frame) in &profiles {
+                seen.resize(frame[i].len(), Moments::default());
+                for (seen, more) in seen.iter_mut().zip(&frame[i]) {
+                    seen.merge(more);
+                }
+            }
+            facts.pairs.insert((id(value), id(operand)), seen);
+        }
+        let profiles: Vec<_> = profiles.into_iter().map(|(probes, _)| probes).collect();
         for (i, value) in probes.iter().enumerate() {
             let mut fact = ValueFacts::default();
             let components = profiles
@@ -66,9 +86,7 @@ impl SampleSet<'_> {
                 fact.max.push(max);
             }
             if fact.count > 0 {
-                facts
-                    .values
-                    .insert(shader.id(Stage::Fragment, *value).clone(), fact);
+                facts.values.insert(id(*value), fact);
             }
         }
         facts

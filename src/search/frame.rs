@@ -143,6 +143,20 @@ impl Rasterised {
         let colours = drawing.colours(&shading, self.reference.len(), output);
         self.reference.flip(&colours, pixels_per_degree)
     }
+
+    /// For each program, what it leaves at each pixel of every drawing (see [`Reference::differences`]).
+    pub(super) fn differences(&self, programs: &[Program], output: Output) -> Vec<Vec<[f32; 6]>> {
+        let mut shading = Shading::default();
+        let mut of_all = vec![Vec::new(); programs.len()];
+        for drawing in &self.drawings {
+            for (program, differences) in programs.iter().zip(&mut of_all) {
+                drawing.shade(program, &self.bindings, &mut shading);
+                let colours = drawing.colours(&shading, self.reference.len(), output);
+                differences.extend(self.reference.differences(&colours));
+            }
+        }
+        of_all
+    }
 }
 
 /// Shades, and lights what was shaded where something lights it.

@@ -9,6 +9,7 @@
 //! This work is based on: Olano, Kuehne, Simmons, "Automatic Shader Level of Detail", 2003,
 //! section 2; the lazy queue is that of Minoux, "Accelerated greedy algorithms", 1978.
 
+use super::best::best;
 use super::frontier::{Frontier, Seen};
 use super::interval::Interval;
 use super::samples::{Measured, SampleSet};
@@ -137,6 +138,8 @@ impl Descent<'_> {
             };
             let leader = self.lead(&mut step, prices, &mut over, frontier, &mut measured, swept);
             let next = leader.and_then(|i| step.take(i));
+            let next =
+                next.map(|next| self.with_best_numbers(next, &current, frontier, &mut measured));
             match next {
                 Some(next) => {
                     current = next;
@@ -147,6 +150,32 @@ impl Descent<'_> {
                 None => return measured,
             }
         }
+    }
+
+    /// The variant with the best numbers in its last step, found only now that it is worth a step.
+    fn with_best_numbers(
+        &self,
+        mut next: Variant,
+        current: &Variant,
+        frontier: &mut Frontier,
+        measured: &mut u64,
+    ) -> Variant {
+        let better = next
+            .recipe
+            .0
+            .last()
+            .and_then(|last| best(self.interval, &current.shader, last, &next.measured));
+        if let Some(better) = better
+            && better.measured.strain <= 1.0
+        {
+            *measured += 1;
+            next.recipe.0.pop();
+            next.recipe.0.push(better.candidate);
+            next.shader = better.shader;
+            next.measured = better.measured;
+            frontier.add(next.seen());
+        }
+        next
     }
 
     /// The candidate with the best price that this step has confirmed.

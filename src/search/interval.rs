@@ -23,6 +23,11 @@ impl<'a> Interval<'a> {
         &self.0[0]
     }
 
+    /// The samples at each of its distances.
+    pub(crate) fn sets(&self) -> &[SampleSet<'a>] {
+        &self.0
+    }
+
     /// Measures a variant at every distance: error and work are those at the start, the strain is the largest, the
     /// load the mean.
     pub(crate) fn measure(&self, shader: &Shader) -> Result<Measured, Refused> {

@@ -3,12 +3,13 @@
 //! ```text
 //! Scene x original --samples--> SampleSet      what errors are measured over, at one distance
 //! SampleSet x Shader --error--> E^2, work      one variant
-//! base x SampleSet --greedy--> variants --frontier--> non-dominated ones
+//! base x SampleSet --greedy, best--> variants --frontier--> non-dominated ones
 //! frontiers x distances --levels--> levels     confirmed on the full set
 //! ```
 //!
 //! It knows nothing of the command line or of reports.
 
+mod best;
 mod confirm;
 pub mod error;
 mod facts;

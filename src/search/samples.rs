@@ -196,6 +196,12 @@ impl<'a> SampleSet<'a> {
         }
     }
 
+    /// What one squared difference of one pixel adds to the load.
+    pub(super) fn load_of_square(&self) -> f64 {
+        let bound = self.stand.scene.bound(self.distance).max(LEAST_BOUND);
+        1.0 / (bound.powi(2) * self.original.0.error.coverage.max(1.0))
+    }
+
     /// Draws every frame at every offset.
     fn details(&self, fragment: &Program) -> (Details, Work) {
         let output = self.stand.scene.output;

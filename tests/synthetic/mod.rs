@@ -1,11 +1,12 @@
 //! Facts that nobody measured, for tests of the passes: the same for a shader on every run.
 
-use lodc_passes::facts::{Facts, TextureFacts, ValueFacts};
-use lodc_passes::{Shader, Stage};
+use lodc_passes::facts::{Facts, Moments, TextureFacts, ValueFacts};
+use lodc_passes::{Shader, Stage, op_removal};
 use naga::TypeInner;
 
 /// Facts in which every f32 value of both stages was seen 64 times, between 0 and 1 with the mean 0.5,
-/// and every texture has an image of three MIP levels.
+/// every texture has an image of three MIP levels, and every
+/// value that may be fitted to an operand falls as that rises.
 pub(crate) fn facts(shader: &Shader) -> Facts {
     let mut facts = Facts::default();
     for stage in [Stage::Vertex, Stage::Fragment] {
@@ -31,6 +32,23 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
                 },
             );
         }
+    }
+    for (value, operand) in op_removal::pairs(shader) {
+        let count = match *shader.type_of(Stage::Fragment, value) {
+            TypeInner::Vector { size, .. } => size as usize,
+            _ => 1,
+        };
+        // A value that falls from 0.75 as its operand rises, a little off the line.
+        let seen = Moments {
+            count: 64,
+            mean: [0.5, 0.5],
+            squares: [1.25, 4.0],
+            product: -2.0,
+        };
+        let id = |value| shader.id(Stage::Fragment, value).clone();
+        facts
+            .pairs
+            .insert((id(value), id(operand)), vec![seen; count]);
     }
     for (_, variable) in shader.module().global_variables.iter() {
         if let TypeInner::Image { .. } = shader.module().types[variable.ty].inner
@@ -66,6 +84,10 @@ pub(crate) fn awkward_facts(shader: &Shader, mut next: impl FnMut(usize) -> usiz
             value.min[i] = mean - spread;
             value.max[i] = mean + spread;
         }
+    }
+    for moments in facts.pairs.values_mut().flatten() {
+        moments.mean = [0, 1].map(|_| awkward[next(awkward.len())]).map(f64::from);
+        moments.product *= [1.0, -1.0, 0.0][next(3)];
     }
     facts
 }

@@ -6,9 +6,12 @@
 //! of any of its loads, so every answer errs on the careful side.
 
 mod decides;
+mod dynamic;
 mod holes;
+mod meaning;
 
 pub(crate) use decides::Decides;
+pub(crate) use dynamic::Dynamic;
 pub(crate) use holes::Holes;
 
 use crate::operands::{self, User};

@@ -6,7 +6,10 @@
 //! parts, or an input, and the samples saw it.
 //!
 //! Effect. `keep <operand's id>`: the site's users use that operand. `mean`: they use the value's mean over
-//! the samples, a constant that the candidate carries. `without`: every operation that uses the site
+//! the samples, a constant that the candidate carries. `best`: the same with the constant that leaves the least
+//! error on the screen; a search makes it of a mean that is worth it. `fit <operand's id>`: the users use
+//! `scale * operand + offset`, component by component, from least squares over the samples; where a hole comes
+//! after it is `fit-within`, clamped to what the value was seen to be. `without`: every operation that uses the site
 //! keeps its other operand, as if the site were the zero of a sum, the one of a product, or the side of
 //! a mix that is not chosen; so a costly value that several operations share dies at once, where each
 //! removal alone would save nothing. `accept` and `reject`, at the condition of an `if`: that side is
@@ -29,6 +32,11 @@
 //!   is decided when candidates are listed, not when they are replayed.
 //! - A side of an `if` that has an operation with a hole, unless all samples took that side: the test
 //!   may be there for the hole. A side that always discards.
+//! - `mean`, `best` and `fit` of whole numbers, of angles, and of what is only compared or made an integer.
+//! - What depends on a uniform or texture that may take any value, unless what takes its place does too; and
+//!   `mean`, `best` and `fit` of it always. Like guards, this is decided when candidates are listed.
+//! - `fit` where it costs as much as what it removes; where the line leaves more than half of the value's
+//!   variance; and where keeping the operand does as well.
 //! - `mean` where it is dominated: the only user is an operation on the value and constants, whose own
 //!   mean is cheaper and no worse.
 //! - `without` where an operation has no such operand, or there is only one operation.
@@ -38,7 +46,10 @@
 //! section 3; Pitchaya Sitthi-amorn, Nicholas Modly, Westley Weimer, Jason Lawrence, "Genetic
 //! Programming for Shader Simplification", 2011, section 4.
 
+mod fit;
 mod survey;
+
+use fit::Limited;
 
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
@@ -47,8 +58,8 @@ use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, constants};
 use naga::{
-    BinaryOperator as Op, Binding, Block, Expression, Literal, MathFunction as Math, Statement,
-    UnaryOperator,
+    BinaryOperator as Op, Binding, Block, Expression, Handle, Literal, MathFunction as Math,
+    Statement, UnaryOperator,
 };
 
 /// The stages whose operations are removed. The other passes' errors are those of fragments too.
@@ -61,8 +72,10 @@ pub struct OpRemoval;
 enum Choice {
     /// The users use an operand.
     Keep(ValueId),
-    /// The users use the baked mean.
-    Mean,
+    /// The users use a baked constant: the mean, or the best one.
+    Constant,
+    /// The users use an affine function of an operand, within limits or not.
+    Fit(ValueId, Limited),
     /// The users do without it.
     Without,
     /// The site, a truth value, makes every `if` on it take this side.
@@ -73,7 +86,9 @@ impl Choice {
     fn parse(choice: &str) -> Result<Self, Declined> {
         match choice.split_once(' ') {
             Some(("keep", id)) => Ok(Self::Keep(id.into())),
-            None if choice == "mean" => Ok(Self::Mean),
+            Some(("fit", id)) => Ok(Self::Fit(id.into(), Limited(false))),
+            Some(("fit-within", id)) => Ok(Self::Fit(id.into(), Limited(true))),
+            None if choice == "mean" || choice == "best" => Ok(Self::Constant),
             None if choice == "without" => Ok(Self::Without),
             None if choice == "accept" => Ok(Self::Take(true)),
             None if choice == "reject" => Ok(Self::Take(false)),
@@ -105,6 +120,22 @@ impl Pass for OpRemoval {
         found
     }
 
+    fn with_numbers(&self, candidate: &Candidate, numbers: &[f32]) -> Option<Candidate> {
+        match Choice::parse(&candidate.choice).ok()? {
+            Choice::Constant => Some(candidate.with("best", numbers)),
+            Choice::Fit(_, Limited(false)) => Some(candidate.with(&candidate.choice, numbers)),
+            Choice::Fit(_, Limited(true)) => {
+                // Limits are what was seen, whatever suits the picture.
+                let mut numbers = numbers.to_vec();
+                let seen: Vec<f32> = candidate.numbers().collect();
+                let half = seen.len() / 2;
+                numbers.get_mut(half..)?.copy_from_slice(seen.get(half..)?);
+                Some(candidate.with(&candidate.choice, &numbers))
+            }
+            _ => None,
+        }
+    }
+
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
         plan(shader, candidate).map(drop)
     }
@@ -117,6 +148,7 @@ impl Pass for OpRemoval {
                     let new = match new {
                         Becomes::Value(kept) => New::Value(kept),
                         Becomes::Numbers(numbers) => New::Numbers(numbers),
+                        Becomes::Line(line) => New::Value(line.write(shader, &mut edit, value)),
                         Becomes::Side(side) => {
                             let path = format!("{}.{}", candidate.site.path(), candidate.choice);
                             let side = Expression::Literal(Literal::Bool(side));
@@ -132,11 +164,32 @@ impl Pass for OpRemoval {
     }
 }
 
+/// The values of the fragment stage and operands of theirs whose [`Moments`](crate::facts::Moments) are worth gathering:
+/// those for which a fit would save work.
+pub fn pairs(shader: &Shader) -> Vec<(Handle<Expression>, Handle<Expression>)> {
+    let facts = Facts::default();
+    let mut found = Vec::new();
+    for flow in STAGES.iter().filter_map(|stage| Flow::new(shader, *stage)) {
+        let survey = survey::Survey::new(&flow, &facts);
+        for (site, _) in flow.function.expressions.iter() {
+            if !flow.is_constant(site)
+                && may_change(&flow, site).is_ok()
+                && has_mean(&flow, site).is_ok()
+            {
+                found.extend(survey.fits(site).into_iter().map(|operand| (site, operand)));
+            }
+        }
+    }
+    found
+}
+
 /// What takes the place of a value.
 #[derive(Debug)]
 enum Becomes {
     Value(Value),
     Numbers(Vec<f32>),
+    /// An affine function of an operand.
+    Line(fit::Line),
     /// The truth value that has an `if` take a side.
     Side(bool),
 }
@@ -172,18 +225,34 @@ fn plan(
             }
             vec![(site, Becomes::Value(kept))]
         }
-        Choice::Mean => {
+        Choice::Constant => {
             let count = mean_components(&flow, site).ok_or_else(|| {
                 Declined("it is no operation, merged variable or input of f32".into())
             })?;
             let numbers = candidate.baked(count)?;
             let sites = all_of(&flow, site);
-            sites.iter().try_for_each(|site| may_change(&flow, *site))?;
+            sites.iter().try_for_each(|site| {
+                may_change(&flow, *site)?;
+                has_mean(&flow, *site)
+            })?;
             follow(&flow, &sites, &numbers)?;
             sites
                 .into_iter()
                 .map(|site| (site, Becomes::Numbers(numbers.clone())))
                 .collect()
+        }
+        Choice::Fit(id, limited) => {
+            may_change(&flow, site)?;
+            has_mean(&flow, site)?;
+            let operands = fit::operands(&flow, site);
+            let operand = named(&flow, &operands, &id).ok_or_else(|| {
+                let (id, site) = (id.path(), candidate.site.path());
+                Declined(format!(
+                    "`{id}` is no operand that `{site}` can be fitted to"
+                ))
+            })?;
+            let line = fit::Line::new(&flow, site, operand, limited, candidate)?;
+            vec![(site, Becomes::Line(line))]
         }
         Choice::Without => without(&flow, site)?
             .into_iter()
@@ -203,6 +272,12 @@ fn may_change(flow: &Flow, value: Value) -> Result<(), Declined> {
         Some(why) => Err(Declined(why.to_string())),
         None => Ok(()),
     }
+}
+
+/// Declines a value that has no mean.
+fn has_mean(flow: &Flow, value: Value) -> Result<(), Declined> {
+    flow.meaning(value)
+        .map_or(Ok(()), |meaning| Err(meaning.into()))
 }
 
 /// The operands of an operation that have its own type, each once: those that can take its place.

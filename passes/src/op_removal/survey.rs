@@ -1,10 +1,11 @@
 //! Which of the possible removals are offered, by what the facts say of them.
 
 use super::{
-    If, OpRemoval, all_of, follow, ifs, may_change, mean_components, own_operands, take, without,
+    If, OpRemoval, all_of, fit, follow, has_mean, ifs, may_change, mean_components, own_operands,
+    take, without,
 };
 use crate::cost::{self, Work};
-use crate::flow::{Flow, Holes, Value};
+use crate::flow::{Dynamic, Flow, Holes, Value};
 use crate::recipe::{Candidate, Considered, Declined, Pass};
 use crate::{Facts, constants, operands};
 use naga::{BinaryOperator as Op, Expression, MathFunction as Math, Statement};
@@ -80,6 +81,8 @@ pub(super) struct Survey<'a> {
     leads_to_read: Vec<bool>,
     /// What each value alone costs.
     work: Vec<Work>,
+    /// What depends on something that may take any value.
+    dynamic: Dynamic,
 }
 
 impl<'a> Survey<'a> {
@@ -92,6 +95,7 @@ impl<'a> Survey<'a> {
             varying: flow.varying(),
             leads_to_read: leads_to_read(flow),
             work: cost::of_expressions(flow.module, &flow.function.expressions, &types),
+            dynamic: Dynamic::of(flow, facts),
         }
     }
 
@@ -113,6 +117,12 @@ impl<'a> Survey<'a> {
                     let verdict = self.keep(site, kept).map(|()| Vec::new());
                     found.push(self.considered(site, choice, verdict));
                 }
+            }
+            for operand in self.fits(site) {
+                let within = self.holes[site.index()] != Holes::default();
+                let word = if within { "fit-within" } else { "fit" };
+                let choice = format!("{word} {}", self.flow.id(operand));
+                found.push(self.considered(site, choice, self.fit(site, operand)));
             }
             if let Some(count) = mean_components(self.flow, site)
                 && !self.is_dominated(site)
@@ -151,8 +161,62 @@ impl<'a> Survey<'a> {
         }
     }
 
+    /// The operands that a value may be fitted to for less than what goes with it costs.
+    pub(super) fn fits(&self, site: Value) -> Vec<Value> {
+        let count = self.flow.floats(site).unwrap_or(0);
+        let limited = self.holes[site.index()] != Holes::default();
+        let mut operands = fit::operands(self.flow, site);
+        operands.retain(|operand| {
+            let cost = fit::work(count, limited);
+            self.varying[operand.index()] && self.dies_with(site, Some(*operand), cost + 0.5) > cost
+        });
+        operands
+    }
+
+    fn fit(&self, site: Value, operand: Value) -> Result<Vec<u32>, Declined> {
+        may_change(self.flow, site)?;
+        has_mean(self.flow, site)?;
+        self.holds_for_all(site)?;
+        let pair = (self.flow.id(site).clone(), self.flow.id(operand).clone());
+        let seen = self.facts.pairs.get(&pair);
+        let seen = seen.filter(|seen| seen.iter().all(|moments| moments.count > 0));
+        let seen = seen.ok_or_else(|| Declined("no sample of the scene computes it".into()))?;
+        let can_keep =
+            self.flow.inner(operand) == self.flow.inner(site) && self.keep(site, operand).is_ok();
+        let mut numbers = fit::numbers(seen, can_keep)?;
+        if self.holes[site.index()] != Holes::default() {
+            let range = self.facts.values.get(self.flow.id(site));
+            let range = range.filter(|range| {
+                let all = range.min.iter().chain(&range.max);
+                all.clone().count() == numbers.len() && all.clone().all(|n| n.is_finite())
+            });
+            let range = range.ok_or_else(|| {
+                Declined(
+                    "it comes before an operation with holes, and its range is not known".into(),
+                )
+            })?;
+            numbers.extend(range.min.iter().chain(&range.max));
+        }
+        Ok(numbers.iter().map(|number| number.to_bits()).collect())
+    }
+
+    /// Declines a number for what may take any value.
+    fn holds_for_all(&self, value: Value) -> Result<(), Declined> {
+        match self.dynamic.is(value) {
+            true => Err(Declined(
+                "it depends on something that may take any value".into(),
+            )),
+            false => Ok(()),
+        }
+    }
+
     fn keep(&self, site: Value, kept: Value) -> Result<(), Declined> {
         may_change(self.flow, site)?;
+        if self.dynamic.loses(site, kept) {
+            return Err(Declined(
+                "what would go depends on something that may take any value".into(),
+            ));
+        }
         if !self.varying[kept.index()] && self.stills_a_read(site) {
             return Err(Declined("a texture would be read at one place only".into()));
         }
@@ -177,6 +241,8 @@ impl<'a> Survey<'a> {
         let sites = all_of(self.flow, site);
         for site in &sites {
             may_change(self.flow, *site)?;
+            has_mean(self.flow, *site)?;
+            self.holds_for_all(*site)?;
             if self.stills_a_read(*site) {
                 return Err(Declined("a texture would be read at one place only".into()));
             }
@@ -194,7 +260,9 @@ impl<'a> Survey<'a> {
     }
 
     fn take(&self, condition: Value, ifs: &[If], side: bool) -> Result<(), Declined> {
-        for branch in take(self.flow, condition, ifs, side)? {
+        let taken = take(self.flow, condition, ifs, side)?;
+        self.holds_for_all(condition)?;
+        for branch in taken {
             // How many samples came to the test, as far as the facts know.
             let mut came = 0;
             let mut open = BTreeSet::from([condition]);
@@ -363,15 +431,22 @@ impl<'a> Survey<'a> {
         if self.flow.input(site).is_some() {
             return true;
         }
+        self.dies_with(site, None, COSTLY) >= COSTLY
+    }
+
+    /// The work, in full-rate scalar operations, that goes with a value and is not needed for another one that stays;
+    /// counted until it is `enough`.
+    fn dies_with(&self, site: Value, stays: Option<Value>, enough: f64) -> f64 {
         let mut work = 0.0;
         let mut dead = vec![site];
         let mut next = 0;
-        while next < dead.len() && work < COSTLY {
+        while next < dead.len() && work < enough {
             let value = dead[next];
             next += 1;
             work += self.work[value.index()].total();
             operands::each(&self.flow.function.expressions[value], |operand| {
-                let dies = !dead.contains(&operand)
+                let dies = Some(operand) != stays
+                    && !dead.contains(&operand)
                     && !self.flow.is_stated(operand)
                     && self.flow.users(operand).all(|user| dead.contains(&user));
                 if dies {
@@ -379,7 +454,7 @@ impl<'a> Survey<'a> {
                 }
             });
         }
-        work >= COSTLY
+        work
     }
 }
 

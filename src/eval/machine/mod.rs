@@ -17,6 +17,7 @@ use super::program::Program;
 use super::program::code::{Case, Instruction, Register, Step};
 use super::texture::{Sampler, Texture};
 use lodc_passes::Work;
+use lodc_passes::facts::Moments;
 use lodc_passes::semantics::{Kind, words};
 use naga::{ScalarKind, Span};
 use std::collections::BTreeMap;
@@ -67,6 +68,8 @@ pub struct Profile {
     pub work: Work,
     /// For each probe of the program and each of its components: what covered active lanes held.
     pub probes: Vec<Vec<Probe>>,
+    /// For each probe of a value beside an operand, and each component of the value.
+    pub pairs: Vec<Vec<Moments>>,
     /// Covered lanes that were still in a loop when it was stopped because it does not seem to end. Their
     /// outputs are NaN and 0.
     pub ran_away: u64,
@@ -81,9 +84,15 @@ impl Profile {
         self.work += later.work;
         self.ran_away += later.ran_away;
         self.endless = self.endless.or(later.endless);
-        if self.probes.is_empty() {
+        if self.probes.is_empty() && self.pairs.is_empty() {
             self.probes.clone_from(&later.probes);
+            self.pairs.clone_from(&later.pairs);
             return;
+        }
+        for (ours, theirs) in self.pairs.iter_mut().zip(&later.pairs) {
+            for (ours, theirs) in ours.iter_mut().zip(theirs) {
+                ours.merge(theirs);
+            }
         }
         for (ours, theirs) in self.probes.iter_mut().zip(&later.probes) {
             for (ours, theirs) in ours.iter_mut().zip(theirs) {
@@ -169,6 +178,7 @@ pub struct Machine<'a, R = f32> {
     lanes: u64,
     lost: u64,
     probes: Vec<Vec<Probe>>,
+    pairs: Vec<Vec<Moments>>,
 }
 
 impl<'a> Machine<'a> {
@@ -255,6 +265,11 @@ impl<'a, R: Lane> Machine<'a, R> {
                 .probes
                 .iter()
                 .map(|&components| vec![Probe::default(); components])
+                .collect(),
+            pairs: program
+                .pairs
+                .iter()
+                .map(|&components| vec![Moments::default(); components])
                 .collect(),
         };
         for &(kind, register, bits) in &code.constants {
@@ -347,6 +362,7 @@ impl<'a, R: Lane> Machine<'a, R> {
             lanes: self.lanes,
             work,
             probes: self.probes.clone(),
+            pairs: self.pairs.clone(),
             ran_away: self.lost,
             endless: self.endless,
         }
@@ -679,15 +695,31 @@ impl<'a, R: Lane> Machine<'a, R> {
             } => self.query(results, *texture, *question, *level),
             Instruction::Probe { probe, values } => {
                 let lanes = self.counted();
-                let probe = &mut self.probes[*probe as usize];
-                for (probe, register) in probe.iter_mut().zip(values) {
-                    for lane in lanes.lanes() {
-                        let value = if register.is_uniform() {
-                            self.registers.uniform_floats[register.index()]
-                        } else {
-                            self.registers.floats[register.index()][lane]
-                        };
-                        probe.add(value.to_f32());
+                let registers = &self.registers;
+                let read = |register: &Register, lane: usize| {
+                    let value = if register.is_uniform() {
+                        registers.uniform_floats[register.index()]
+                    } else {
+                        registers.floats[register.index()][lane]
+                    };
+                    value.to_f32()
+                };
+                let probe = *probe as usize;
+                match probe.checked_sub(self.probes.len()) {
+                    None => {
+                        for (probe, register) in self.probes[probe].iter_mut().zip(values) {
+                            for lane in lanes.lanes() {
+                                probe.add(read(register, lane));
+                            }
+                        }
+                    }
+                    Some(pair) => {
+                        let both = values.as_chunks::<2>().0.iter();
+                        for (moments, both) in self.pairs[pair].iter_mut().zip(both) {
+                            for lane in lanes.lanes() {
+                                moments.add(both.each_ref().map(|r| f64::from(read(r, lane))));
+                            }
+                        }
                     }
                 }
             }

@@ -207,7 +207,7 @@ pub(in crate::eval) enum Instruction {
         question: Question,
         level: Option<Register>,
     },
-    /// Adds values to a probe.
+    /// Adds values to a probe; to one of pairs, two at a time.
     Probe {
         probe: u32,
         values: Vec<Register>,

@@ -93,7 +93,7 @@ pub(super) enum Node {
         question: Question,
         level: Option<Id>,
     },
-    /// Adds the values to a probe, component by component.
+    /// Adds the values to a probe, component by component; for a probe of pairs, two at a time.
     Probe {
         probe: u32,
         values: Vec<Id>,
@@ -148,6 +148,8 @@ pub(super) struct Ir {
     pub(super) samplers: Vec<(u32, u32)>,
     /// The components of each probe.
     pub(super) probes: Vec<usize>,
+    /// The components of each probe of a value beside an operand; these are numbered on from the others.
+    pub(super) pairs: Vec<usize>,
     pub(super) discards: bool,
     /// Where the loop of each label is.
     pub(super) loops: Vec<(Label, Span)>,

@@ -97,6 +97,8 @@ pub(super) struct Frame<'a> {
     on_demand: bool,
     /// Probes by expression, in the entry point.
     probes: HashMap<usize, u32>,
+    /// By expression, the probes of it beside an operand of it, with the operand.
+    pairs: HashMap<usize, Vec<(u32, Handle<Expression>)>>,
 }
 
 /// The value of a slot in straight-line code.
@@ -199,6 +201,7 @@ impl<'a> Lowering<'a> {
         module: &'a Module,
         entry: &'a naga::EntryPoint,
         probes: &[Handle<Expression>],
+        pairs: &[(Handle<Expression>, Handle<Expression>)],
     ) -> Result<Ir, Refused> {
         let context = ResolveContext::with_locals(module, EMPTY_LOCALS, &[]);
         let mut types = Typifier::new();
@@ -225,6 +228,7 @@ impl<'a> Lowering<'a> {
             continues: Vec::new(),
             on_demand: true,
             probes: HashMap::new(),
+            pairs: HashMap::new(),
         };
         let mut lowering = Self {
             module,
@@ -249,7 +253,7 @@ impl<'a> Lowering<'a> {
         }
         let facts = lowering.examine(&entry.function)?;
         lowering.private_variables()?;
-        lowering.entry_point(entry, facts, probes)?;
+        lowering.entry_point(entry, facts, probes, pairs)?;
         lowering.ir.body = std::mem::take(&mut lowering.open.nodes);
         Ok(lowering.ir)
     }
@@ -750,6 +754,7 @@ impl<'a> Lowering<'a> {
         entry: &'a naga::EntryPoint,
         facts: Rc<Facts>,
         probes: &[Handle<Expression>],
+        pairs: &[(Handle<Expression>, Handle<Expression>)],
     ) -> Result<(), Refused> {
         let module = self.module;
         let mut arguments = Vec::new();
@@ -775,7 +780,24 @@ impl<'a> Lowering<'a> {
                 by_expression.insert(probe.index(), i as u32);
             }
         }
-        let result = self.inline(&entry.function, facts, arguments, by_expression)?;
+        let mut of_pairs: HashMap<usize, Vec<_>> = HashMap::new();
+        for (i, &(value, operand)) in (probes.len()..).zip(pairs) {
+            let floats = |value| {
+                let inner = facts.types.get(value, &module.types);
+                let shape = lodc_passes::semantics::Shape::of(inner);
+                let shape = shape.filter(|shape| shape.kind() == ScalarKind::Float);
+                shape.map_or(0, |shape| shape.components())
+            };
+            let components = floats(value);
+            let fits = [1, components].contains(&floats(operand));
+            self.ir.pairs.push(if fits { components } else { 0 });
+            if fits {
+                let pairs = of_pairs.entry(value.index()).or_default();
+                pairs.push((i as u32, operand));
+            }
+        }
+        let watched = (by_expression, of_pairs);
+        let result = self.inline(&entry.function, facts, arguments, watched)?;
         self.count();
         if let Some(ty) = &entry.function.result {
             let mut kinds = Vec::new();
@@ -792,7 +814,10 @@ impl<'a> Lowering<'a> {
         function: &'a Function,
         facts: Rc<Facts>,
         arguments: Vec<Entity>,
-        probes: HashMap<usize, u32>,
+        (probes, pairs): (
+            HashMap<usize, u32>,
+            HashMap<usize, Vec<(u32, Handle<Expression>)>>,
+        ),
     ) -> Result<Entity, Refused> {
         let module = self.module;
         let early = facts.early;
@@ -830,6 +855,7 @@ impl<'a> Lowering<'a> {
             continues: Vec::new(),
             on_demand: false,
             probes,
+            pairs,
         };
         let caller = std::mem::replace(&mut self.frame, frame);
         // The frame of global expressions is the first.
@@ -898,6 +924,19 @@ impl<'a> Lowering<'a> {
         if let Some(&probe) = self.frame.probes.get(&handle.index()) {
             let entity = self.expression(handle)?;
             let values = self.components(entity)?;
+            self.push(Node::Probe { probe, values });
+        }
+        let pairs = self.frame.pairs.remove(&handle.index());
+        for (probe, operand) in pairs.into_iter().flatten() {
+            let entity = self.expression(handle)?;
+            let firsts = self.components(entity)?;
+            let entity = self.expression(operand)?;
+            let seconds = self.components(entity)?;
+            let seconds = seconds.iter().cycle();
+            let values = firsts.into_iter().zip(seconds);
+            let values = values
+                .flat_map(|(first, second)| [first, *second])
+                .collect();
             self.push(Node::Probe { probe, values });
         }
         Ok(())
@@ -1008,8 +1047,12 @@ impl<'a> Lowering<'a> {
                 }
                 let module = self.module;
                 let facts = self.facts_of(*function)?;
-                let value =
-                    self.inline(&module.functions[*function], facts, given, HashMap::new())?;
+                let value = self.inline(
+                    &module.functions[*function],
+                    facts,
+                    given,
+                    Default::default(),
+                )?;
                 if let Some(result) = result {
                     self.frame.values[result.index()] = value;
                     self.probe(*result)?;

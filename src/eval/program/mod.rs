@@ -39,6 +39,8 @@ pub struct Program {
     pub(super) probes: Vec<usize>,
     /// Where the loop of each label is.
     pub(super) loops: Vec<(u32, Span)>,
+    /// The components of each probe of a value beside an operand.
+    pub(super) pairs: Vec<usize>,
 }
 
 /// One scalar component of an entry point's input or output.
@@ -93,8 +95,24 @@ impl Program {
         entry: usize,
         probes: &[Handle<Expression>],
     ) -> Result<Self, Refused> {
+        Self::compile_with_pairs(module, entry, probes, &[])
+    }
+
+    /// The same with probes of values beside an operand of theirs, which has as many components or one.
+    ///
+    /// # Errors
+    /// As [`compile`](Self::compile).
+    ///
+    /// # Panics
+    /// As [`compile`](Self::compile).
+    pub fn compile_with_pairs(
+        module: &Module,
+        entry: usize,
+        probes: &[Handle<Expression>],
+        pairs: &[(Handle<Expression>, Handle<Expression>)],
+    ) -> Result<Self, Refused> {
         let function = &module.entry_points[entry].function;
-        let mut ir = lower::Lowering::run(module, &module.entry_points[entry], probes)?;
+        let mut ir = lower::Lowering::run(module, &module.entry_points[entry], probes, pairs)?;
         simplify::simplify(&mut ir);
         let homes = uniform::Homes::of(&ir);
         let uniformity = uniform::analyse(&ir, &homes);
@@ -109,6 +127,7 @@ impl Program {
             samplers: ir.samplers,
             probes: ir.probes,
             loops: ir.loops,
+            pairs: ir.pairs,
         })
     }
 

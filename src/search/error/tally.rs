@@ -108,6 +108,14 @@ impl Reference {
         (sum, self.places.len())
     }
 
+    /// For each pixel, what is drawn less the reference, as [`ReferencePixel::difference`] has it.
+    pub(crate) fn differences(&self, colours: &[Option<[f32; 3]>]) -> Vec<[f32; 6]> {
+        let pixels = self.pixels.iter().zip(colours);
+        pixels
+            .map(|(pixel, colour)| pixel.difference(*colour))
+            .collect()
+    }
+
     /// How many pixels it has.
     pub(crate) fn len(&self) -> usize {
         self.pixels.len()

@@ -1,5 +1,5 @@
 // The early break reads floats, but the counter ends the loop without it.
-// expect: 12 candidates
+// expect: 11 candidates
 @group(0) @binding(0) var<uniform> steps: i32;
 
 @fragment

@@ -1,5 +1,5 @@
 // Samples stay between 0.5 and 0.9, far above 0.0001.
-// expect: 3 candidates
+// expect: 4 candidates
 // facts: fs_main.size min 0.5 max 0.9
 
 @fragment

@@ -1,5 +1,5 @@
 // A square matrix times a vector may leave the vector; the vector has no side to leave the matrix.
-// expect: 8 candidates
+// expect: 11 candidates
 @group(0) @binding(0) var<uniform> twist: mat3x3f;
 @group(0) @binding(1) var<uniform> widen: mat2x3f;
 

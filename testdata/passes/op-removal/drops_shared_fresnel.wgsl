@@ -1,5 +1,5 @@
 // Two products share the power: it dies only when both do without it.
-// expect: 15 candidates
+// expect: 17 candidates
 @fragment
 fn fs_main(@location(0) cosine: f32, @location(1) sky: vec3f, @location(2) coat: vec3f) -> @location(0) vec4f {
     let fresnel = pow(saturate(1.0 - cosine), 5.0);

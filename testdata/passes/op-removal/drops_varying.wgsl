@@ -1,5 +1,5 @@
 // The mean of an input spares the interpolation, all uses at once.
-// expect: 10 candidates
+// expect: 13 candidates
 struct Input {
     @builtin(position) pixel: vec4f,
     @location(0) tangent: vec3f,

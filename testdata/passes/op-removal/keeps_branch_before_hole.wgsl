@@ -1,5 +1,5 @@
 // The test keeps the division from 0, and not all samples passed it.
-// expect: 5 candidates
+// expect: 6 candidates
 // facts: fs_main.share count 16
 
 @fragment

@@ -1,5 +1,5 @@
 // The sine has no other side to keep, so the product that it shares cannot simply go.
-// expect: 15 candidates
+// expect: 17 candidates
 @fragment
 fn fs_main(@location(0) a: f32, @location(1) b: f32) -> @location(0) vec4f {
     let wave = exp(a) * sqrt(a);
