@@ -176,7 +176,7 @@ fn glb(json: &str, chunk: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn per_draw<'f>(frame: &'f Frame, slot: (u32, u32)) -> &'f [Resource] {
+fn per_draw(frame: &Frame, slot: (u32, u32)) -> &[Resource] {
     match &frame.bindings[&slot] {
         Resource::PerDraw(all) => all,
         one => std::slice::from_ref(one),
