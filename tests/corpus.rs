@@ -440,7 +440,7 @@ fn scene_of(source: &Source, path: &Path) -> Result<Scene> {
             let header = format!("[{table}]\n");
             match text.find(&header) {
                 Some(at) => text.insert_str(at + header.len(), &format!("{line}\n")),
-                None => write!(text, "{header}{line}\n").expect("a string takes text"),
+                None => writeln!(text, "{header}{line}").expect("a string takes text"),
             }
         }
         last = Scene::resolve(source, Some((&file, &text)));

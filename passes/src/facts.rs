@@ -107,9 +107,9 @@ impl Moments {
         let part = other.count as f64 / count as f64;
         let apart = [0, 1].map(|i| other.mean[i] - self.mean[i]);
         let weight = self.count as f64 * part;
-        for i in 0..2 {
-            self.mean[i] += apart[i] * part;
-            self.squares[i] += other.squares[i] + apart[i] * apart[i] * weight;
+        for (i, apart) in apart.into_iter().enumerate() {
+            self.mean[i] += apart * part;
+            self.squares[i] += other.squares[i] + apart * apart * weight;
         }
         self.product += other.product + apart[0] * apart[1] * weight;
         self.count = count;

@@ -87,7 +87,7 @@ pub(super) fn best(
 fn step(
     interval: &Interval<'_>,
     numbers: &[f32],
-    made: &(dyn Fn(&[f32]) -> Option<(Candidate, Shader)> + Sync),
+    made: &impl Fn(&[f32]) -> Option<(Candidate, Shader)>,
 ) -> Option<Vec<f64>> {
     let forward: Vec<f32> = numbers
         .iter()

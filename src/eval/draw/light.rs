@@ -231,7 +231,12 @@ impl Lit {
                     let own = shading.depths.get(fragment);
                     let depth = own.unwrap_or(&self.depths[fragment]);
                     // Clamped to the viewport's range; NaN is 0.
-                    [depth.max(0.0).min(1.0), 0.0, 0.0, 1.0]
+                    let shown = if depth.is_nan() {
+                        0.0
+                    } else {
+                        depth.clamp(0.0, 1.0)
+                    };
+                    [shown, 0.0, 0.0, 1.0]
                 }
                 None => plane.cleared(),
             }),

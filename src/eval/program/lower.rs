@@ -95,7 +95,13 @@ pub(super) struct Frame<'a> {
     continues: Vec<Label>,
     /// Whether values may be computed where they are first read, as constants may.
     on_demand: bool,
-    /// Probes by expression, in the entry point.
+    watched: Watched,
+}
+
+/// What is probed in the entry point.
+#[derive(Default)]
+struct Watched {
+    /// Probes by expression.
     probes: HashMap<usize, u32>,
     /// By expression, the probes of it beside an operand of it, with the operand.
     pairs: HashMap<usize, Vec<(u32, Handle<Expression>)>>,
@@ -227,8 +233,7 @@ impl<'a> Lowering<'a> {
             breaks: Vec::new(),
             continues: Vec::new(),
             on_demand: true,
-            probes: HashMap::new(),
-            pairs: HashMap::new(),
+            watched: Watched::default(),
         };
         let mut lowering = Self {
             module,
@@ -768,7 +773,7 @@ impl<'a> Lowering<'a> {
             self.ir.inputs.extend(&values);
             arguments.push(self.list(values));
         }
-        let mut by_expression = HashMap::new();
+        let mut watched = Watched::default();
         for (i, &probe) in probes.iter().enumerate() {
             let inner = facts.types.get(probe, &module.types);
             let components = match lodc_passes::semantics::Shape::of(inner) {
@@ -777,10 +782,9 @@ impl<'a> Lowering<'a> {
             };
             self.ir.probes.push(components);
             if components > 0 {
-                by_expression.insert(probe.index(), i as u32);
+                watched.probes.insert(probe.index(), i as u32);
             }
         }
-        let mut of_pairs: HashMap<usize, Vec<_>> = HashMap::new();
         for (i, &(value, operand)) in (probes.len()..).zip(pairs) {
             let floats = |value| {
                 let inner = facts.types.get(value, &module.types);
@@ -792,11 +796,10 @@ impl<'a> Lowering<'a> {
             let fits = [1, components].contains(&floats(operand));
             self.ir.pairs.push(if fits { components } else { 0 });
             if fits {
-                let pairs = of_pairs.entry(value.index()).or_default();
+                let pairs = watched.pairs.entry(value.index()).or_default();
                 pairs.push((i as u32, operand));
             }
         }
-        let watched = (by_expression, of_pairs);
         let result = self.inline(&entry.function, facts, arguments, watched)?;
         self.count();
         if let Some(ty) = &entry.function.result {
@@ -814,10 +817,7 @@ impl<'a> Lowering<'a> {
         function: &'a Function,
         facts: Rc<Facts>,
         arguments: Vec<Entity>,
-        (probes, pairs): (
-            HashMap<usize, u32>,
-            HashMap<usize, Vec<(u32, Handle<Expression>)>>,
-        ),
+        watched: Watched,
     ) -> Result<Entity, Refused> {
         let module = self.module;
         let early = facts.early;
@@ -854,8 +854,7 @@ impl<'a> Lowering<'a> {
             breaks: Vec::new(),
             continues: Vec::new(),
             on_demand: false,
-            probes,
-            pairs,
+            watched,
         };
         let caller = std::mem::replace(&mut self.frame, frame);
         // The frame of global expressions is the first.
@@ -908,12 +907,14 @@ impl<'a> Lowering<'a> {
 
     /// Probes on what no statement computes.
     fn probe_arguments(&mut self) -> Result<(), Refused> {
-        if self.frame.probes.is_empty() {
+        if self.frame.watched.probes.is_empty() {
             return Ok(());
         }
         let expressions = self.frame.expressions;
         for (handle, expression) in expressions.iter() {
-            if expression.needs_pre_emit() && self.frame.probes.contains_key(&handle.index()) {
+            if expression.needs_pre_emit()
+                && self.frame.watched.probes.contains_key(&handle.index())
+            {
                 self.probe(handle)?;
             }
         }
@@ -921,12 +922,12 @@ impl<'a> Lowering<'a> {
     }
 
     fn probe(&mut self, handle: Handle<Expression>) -> Result<(), Refused> {
-        if let Some(&probe) = self.frame.probes.get(&handle.index()) {
+        if let Some(&probe) = self.frame.watched.probes.get(&handle.index()) {
             let entity = self.expression(handle)?;
             let values = self.components(entity)?;
             self.push(Node::Probe { probe, values });
         }
-        let pairs = self.frame.pairs.remove(&handle.index());
+        let pairs = self.frame.watched.pairs.remove(&handle.index());
         for (probe, operand) in pairs.into_iter().flatten() {
             let entity = self.expression(handle)?;
             let firsts = self.components(entity)?;
@@ -1051,7 +1052,7 @@ impl<'a> Lowering<'a> {
                     &module.functions[*function],
                     facts,
                     given,
-                    Default::default(),
+                    Watched::default(),
                 )?;
                 if let Some(result) = result {
                     self.frame.values[result.index()] = value;
