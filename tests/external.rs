@@ -17,16 +17,20 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// The name that messages call a shader by: its file's, without the extension.
+fn stem(path: &Path) -> String {
+    let name = path.file_stem().expect("a file");
+    name.to_string_lossy().into_owned()
+}
+
 /// Names and texts of the `.wgsl` files of a folder under `testdata/`, in the order of their names.
-fn shaders(folder: &str) -> Vec<(String, String)> {
+fn wgsl_texts(folder: &str) -> Vec<(String, String)> {
     fixtures::shaders(Path::new("testdata").join(folder))
         .into_iter()
+        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
         .map(|path| {
-            let name = path.file_stem().expect("a file").to_string_lossy();
-            (
-                name.into_owned(),
-                fs::read_to_string(&path).expect("a text file"),
-            )
+            let text = fs::read_to_string(&path).expect("a text file");
+            (stem(&path), text)
         })
         .collect()
 }
@@ -172,8 +176,9 @@ fn levels(source: &Source) -> Vec<EmitLevel> {
 /// Shows every shader of a folder to the judges in every form, with levels.
 fn emitted(folder: &str) {
     let mut wgsl = Vec::new();
-    for (name, text) in shaders(folder) {
-        let source = Source::parse(&format!("{name}.wgsl"), text).unwrap_or_else(|e| panic!("{e}"));
+    for path in fixtures::shaders(Path::new("testdata").join(folder)) {
+        let name = stem(&path);
+        let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
         let levels = levels(&source);
         for form in [Form::Override, Form::Uniform, Form::Files] {
             let write = |target| emit::emit(&source, &levels, Output { form, target });
@@ -240,9 +245,9 @@ fn spirv_val_refuses_a_module_without_a_memory_model() {
     }
 }
 
-/// Shows every shader of a folder to naga, Tint and `spirv-val`.
+/// Shows every WGSL shader of a folder, as its author wrote it, to naga, Tint and `spirv-val`.
 fn judged(folder: &str) {
-    let texts = shaders(folder);
+    let texts = wgsl_texts(folder);
     for (name, text) in &texts {
         let (module, info) = validated(name, text);
         if let Some(complaint) = spirv_val(folder, name, &spirv(&module, &info)) {

@@ -338,7 +338,11 @@ fn foreign_directive(name: &str, text: &str) -> Option<Box<Diagnostic>> {
                 Diagnostic::error(format!("{what} not read by this build"))
                     .with_source(name, text)
                     .with_label(place, "not WGSL")
-                    .with_note("build lodc with `--features imports`, which composes modules"),
+                    .with_note(if cfg!(feature = "imports") {
+                        "modules are composed of files: read the shader from one"
+                    } else {
+                        "build lodc with `--features imports`, which composes modules"
+                    }),
             );
         }
         if directive == "import" && words.ends_with(';') {
