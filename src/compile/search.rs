@@ -398,6 +398,7 @@ pub fn inspect(request: &Request) -> Result<String> {
         &ready.source,
         distance,
         &set.original(),
+        &facts,
         &tried,
     ))
 }

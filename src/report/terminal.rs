@@ -4,7 +4,7 @@ use super::{Report, place_of};
 use crate::emit::Form;
 use crate::front::{Place, Source};
 use crate::search::Measured;
-use lodc_passes::{Candidate, Shader};
+use lodc_passes::{Candidate, Facts, Shader, texture_removal};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -124,18 +124,21 @@ pub fn next(report: &Report, form: Form) -> String {
 }
 
 /// The table of every value that could be simplified, in the order of the source's lines, with what
-/// the best single change there saves and adds at `distance`.
+/// the best single change there saves and adds at `distance`, by what the samples showed there.
 pub fn inspection(
     shader: &Shader,
     source: &Source,
     distance: f64,
     original: &Measured,
+    facts: &Facts,
     tried: &[(Candidate, Option<Measured>)],
 ) -> String {
     /// What is known of a site: how many candidates each pass has, and the best one.
     #[derive(Default)]
     struct Site<'a> {
         passes: BTreeMap<&'a str, usize>,
+        /// Where a texture's mean could take its place: the standard deviation of its texels, of the worst channel.
+        deviation: Option<f32>,
         /// Saved share of the cost, added error, and the change.
         best: Option<(f64, f64, &'a Candidate)>,
     }
@@ -154,6 +157,9 @@ pub fn inspection(
                 )
             });
         *site.passes.entry(&candidate.pass).or_default() += 1;
+        if let Some(deviation) = texture_removal::deviation(shader, facts, candidate) {
+            site.deviation = deviation.into_iter().reduce(f32::max);
+        }
         let Some(measured) = measured else { continue };
         let saved = 1.0 - measured.work.total() / original.work.total();
         let added = (measured.error.square() - original.error.square())
@@ -172,6 +178,7 @@ pub fn inspection(
     let mut rows =
         vec![["line", "value", "candidates", "saves", "excess", "by"].map(str::to_owned)];
     for ((_, _, value), (line, site)) in sites {
+        let deviation = site.deviation.map(|d| format!("texels +- {d:.2}"));
         let passes: Vec<String> = site
             .passes
             .iter()
@@ -182,6 +189,7 @@ pub fn inspection(
                     format!("{pass} ({count})")
                 }
             })
+            .chain(deviation)
             .collect();
         let (saves, excess, by) = match site.best {
             Some((saved, added, candidate)) => (
