@@ -14,7 +14,7 @@ pub use init::{InitRequest, init};
 pub use search::{Compiled, compile, inspect};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
-use crate::front::{Modules, Source, Stages};
+use crate::front::{self, Modules, Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
 use lodc_passes::{Shader, normalize};
@@ -197,7 +197,7 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
         };
         // A byte order mark is no part of a text that was read.
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-        emit::hash(text) != hash
+        front::hash(text) != hash
     };
     for texture in &lock.textures {
         if changed(&texture.file, &texture.hash) {

@@ -76,7 +76,7 @@ pub struct LockedModules {
 pub struct LockedFile {
     /// The file, relative to the lock.
     pub file: String,
-    /// Its contents, as [`hash`] gives them.
+    /// Its contents, as [`crate::front::hash`] gives them.
     pub hash: String,
 }
 
@@ -88,7 +88,7 @@ pub struct LockedTexture {
     pub name: String,
     /// The file, relative to the lock.
     pub file: String,
-    /// Its contents, as [`hash`] gives them.
+    /// Its contents, as [`crate::front::hash`] gives them.
     pub hash: String,
     /// Texels per pixel where autoLOD is 0, when it is known.
     pub texels_per_pixel: Option<f64>,
@@ -113,11 +113,6 @@ pub struct LockedLevel {
     pub says: String,
     /// What is done to the original.
     pub recipe: Recipe,
-}
-
-/// The hash of a file's contents as a lock holds it: `blake3:` and 64 hexadecimal digits.
-pub fn hash(bytes: &[u8]) -> String {
-    format!("blake3:{}", blake3::hash(bytes).to_hex())
 }
 
 /// A figure for people, rounded to four significant digits. The figures of a lock are made with it, so that
@@ -565,6 +560,7 @@ impl RawStep {
 mod tests {
     use super::super::{Form, Target};
     use super::*;
+    use crate::front::hash;
 
     fn lock() -> Lock {
         let candidate = |pass: &str, site: &str, choice: &str, value: &[f32]| Candidate {

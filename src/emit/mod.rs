@@ -29,7 +29,7 @@ mod write;
 mod tests;
 
 pub use lock::{
-    FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure, hash,
+    FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure,
 };
 pub use says::says;
 pub use write::{writable, write_atomically};

@@ -10,6 +10,7 @@ use super::tidy::{Style, tidy, with_short_types};
 use super::tokens::{Kind, tokens, words};
 use crate::front;
 use crate::front::identifiers::{Names, letters};
+use crate::front::settle::predeclared;
 use lodc_passes::shader::Stage;
 use naga::back::wgsl::WriterFlags;
 use naga::proc::Layouter;
@@ -232,14 +233,7 @@ fn label_types(
     padding: &BTreeMap<(Handle<Type>, usize), u32>,
     global: &mut dyn FnMut(Option<&str>, &str) -> String,
 ) {
-    let special = &module.special_types;
-    let predeclared: BTreeSet<Handle<Type>> = special
-        .predeclared_types
-        .values()
-        .copied()
-        .chain(special.external_texture_params)
-        .chain(special.external_texture_transfer_function)
-        .collect();
+    let predeclared = predeclared(module);
     let handles: Vec<_> = module.types.iter().map(|(handle, _)| handle).collect();
     for handle in handles {
         let mut ty = module.types[handle].clone();

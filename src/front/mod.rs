@@ -20,7 +20,7 @@ mod lower;
 mod modules;
 pub(crate) mod names;
 mod parse;
-mod settle;
+pub(crate) mod settle;
 mod vertex_stage;
 
 pub use entry::{Input, Stages, inputs};
@@ -393,6 +393,11 @@ impl Text {
             Err(error) => Err(error),
         }
     }
+}
+
+/// The hash of a file's contents, as locks and reports hold it: `blake3:` and 64 hexadecimal digits.
+pub fn hash(bytes: &[u8]) -> String {
+    format!("blake3:{}", blake3::hash(bytes).to_hex())
 }
 
 /// Reads a text file that the user named. `kind` says what it should be: `shader`, `scene`.

@@ -6,7 +6,7 @@
 
 use super::identifiers::Names;
 use naga::{Handle, Module, ShaderStage, Type, TypeInner};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Gives everything at module scope that WGSL writes a name of its own, the one that it has where that can be:
 /// first what the host knows, then the rest. Members of structs, too.
@@ -76,16 +76,19 @@ pub(super) fn settle(module: &mut Module) {
     }
 }
 
-/// The structs of a module that WGSL writes, with their names.
-fn structs(module: &Module) -> BTreeMap<Handle<Type>, Option<String>> {
+/// The structs that WGSL declares by itself, which nobody may write or rename.
+pub(crate) fn predeclared(module: &Module) -> BTreeSet<Handle<Type>> {
     let special = &module.special_types;
-    let predeclared: Vec<Handle<Type>> = special
-        .predeclared_types
-        .values()
-        .copied()
+    let types = special.predeclared_types.values().copied();
+    types
         .chain(special.external_texture_params)
         .chain(special.external_texture_transfer_function)
-        .collect();
+        .collect()
+}
+
+/// The structs of a module that WGSL writes, with their names.
+fn structs(module: &Module) -> BTreeMap<Handle<Type>, Option<String>> {
+    let predeclared = predeclared(module);
     module
         .types
         .iter()

@@ -2,7 +2,11 @@
 
 /// SplitMix64's finaliser (Steele, Lea, Flood 2014): a hash of one word.
 pub(crate) fn mix(word: u64) -> u64 {
-    let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    finalise(word.wrapping_add(0x9e37_79b9_7f4a_7c15))
+}
+
+/// The same without its increment.
+pub(crate) fn finalise(word: u64) -> u64 {
     let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
     word ^ word >> 31

@@ -35,7 +35,7 @@ pub use textures::SceneTexture;
 use crate::eval::draw::Lit;
 use crate::eval::machine::Bindings;
 use crate::eval::raster::{Attribute, Coverage, Frame};
-use crate::front::{Source, VertexStage, inputs, read_text};
+use crate::front::{Source, VertexStage, hash, inputs, read_text};
 use crate::{Diagnostic, Result};
 use buffers::{Buffer, Said};
 use camera::{Around, Pose, Shot, Sphere};
@@ -525,11 +525,6 @@ fn default_object(source: &Source) -> Object {
         Some((entry, _)) if !reads(entry) => Object::Screen,
         _ => Object::Sphere,
     }
-}
-
-/// The hash of an input file.
-fn hash(bytes: &[u8]) -> String {
-    format!("blake3:{}", blake3::hash(bytes).to_hex())
 }
 
 #[cfg(test)]

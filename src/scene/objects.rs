@@ -4,6 +4,7 @@
 //! The same bits come out everywhere: trigonometry is libm's, in f64.
 
 use super::camera::Sphere;
+use super::chance::finalise;
 use super::mesh::Mesh;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -314,16 +315,13 @@ fn noise(seed: u64, at: DVec2) -> f64 {
     top + (bottom - top) * w.y
 }
 
-/// A random number of -1..1 for a seed and a cell (the finaliser of SplitMix64).
+/// A random number of -1..1 for a seed and a cell.
 fn random(seed: u64, x: i64, y: i64) -> f64 {
-    let mut z = seed
+    let z = seed
         .wrapping_mul(0x9e37_79b9_7f4a_7c15)
         .wrapping_add(x.cast_unsigned().wrapping_mul(0xd1b5_4a32_d192_ed03))
         .wrapping_add(y.cast_unsigned().wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
-    (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    (finalise(z) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 #[cfg(test)]

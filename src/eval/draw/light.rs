@@ -263,6 +263,7 @@ impl Lit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eval::draw::tests::program_of;
     use crate::eval::draw::{resolve, shade};
     use crate::eval::raster::Attribute;
     use crate::scene::mesh::Mesh;
@@ -300,12 +301,7 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
 }";
 
     fn program(entry: &str) -> Program {
-        let module = naga::front::wgsl::parse_str(SHADERS).unwrap();
-        naga::valid::Validator::new(Default::default(), naga::valid::Capabilities::all())
-            .validate(&module)
-            .unwrap();
-        let entry = module.entry_points.iter().position(|e| e.name == entry);
-        Program::compile(&module, entry.unwrap(), &[]).unwrap()
+        program_of(SHADERS, entry)
     }
 
     fn frame(mesh: Mesh, size: u32, grid: u32) -> Frame {

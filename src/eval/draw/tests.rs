@@ -134,7 +134,12 @@ struct Deep { @location(0) colour: vec3f, @builtin(frag_depth) depth: f32 }
 ";
 
 fn program(entry: &str) -> Program {
-    let module = naga::front::wgsl::parse_str(SHADERS).unwrap();
+    program_of(SHADERS, entry)
+}
+
+/// An entry point of a text, compiled.
+pub(super) fn program_of(shaders: &str, entry: &str) -> Program {
+    let module = naga::front::wgsl::parse_str(shaders).unwrap();
     naga::valid::Validator::new(Default::default(), naga::valid::Capabilities::all())
         .validate(&module)
         .unwrap();

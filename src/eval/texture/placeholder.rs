@@ -2,6 +2,7 @@
 
 use super::sample::cube_direction;
 use super::{Dimension, Level};
+use crate::scene::chance::mix;
 
 /// Texels along an edge.
 const SIZE: u32 = 64;
@@ -82,15 +83,11 @@ fn noise(seed: u64, place: [f32; 3], cells: u32) -> f32 {
     sum
 }
 
-/// Mixes a number into a seed (the finaliser of SplitMix64).
+/// Mixes a number into a seed.
 fn hash(seed: u64, number: u64) -> u64 {
-    let mut z = seed
+    mix(seed
         .wrapping_mul(0xd134_2543_de82_ef95)
-        .wrapping_add(number)
-        .wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ z >> 31
+        .wrapping_add(number))
 }
 
 #[cfg(test)]
