@@ -213,8 +213,7 @@ pub(super) fn check_colour(source: &Source, fragment: &str) -> Result<()> {
         Some(place) => error.with_label(place, "what it returns is compared"),
         None => error,
     };
-    Err(error
-        .with_note("lodc measures levels by their colours: return one as `@location(0) vec4f`"))
+    Err(error.with_note("lodc measures levels by their colours: return one as `@location(0) vec4f`, in GLSL `layout(location = 0) out vec4 colour;`"))
 }
 
 /// Every location that the fragment stage reads must be written by the vertex stage, in a type that fits.

@@ -4,7 +4,7 @@
 use super::lower::lower;
 use super::parse::uncapitalised;
 use crate::{Diagnostic, Result};
-use naga::front::glsl::{Error, ErrorKind, Frontend, Options};
+use naga::front::glsl::{Error, ErrorKind, Frontend, Options, TokenValue};
 use naga::{Module, ShaderStage};
 
 /// Parses a shader of one stage. GLSL calls every stage `main`, and a module of both needs two names: the entry point
@@ -106,6 +106,22 @@ fn explained(kind: &ErrorKind, word: &str, line: &str) -> (String, Option<String
         ErrorKind::UnknownVariable(variable) if variable == "gl_FragColor" => (
             plain(),
             Some("declare the colour: `layout(location = 0) out vec4 colour;`".to_owned()),
+        ),
+        ErrorKind::PreprocessorError(_) if plain().contains("64BitLiteral") => (
+            "numbers of 64 bits are not read".to_owned(),
+            Some("write `float` and `1.0` for `double` and `1.0lf`".to_owned()),
+        ),
+        ErrorKind::SemanticError(message) if message.starts_with("Missing entry point") => (
+            "there is no `main`".to_owned(),
+            Some("a stage is `void main() { ... }`".to_owned()),
+        ),
+        ErrorKind::SemanticError(message) if message.starts_with("Unexpected qualifier") => (
+            format!("`{word}` is not read here"),
+            Some("blocks are `std140` or `std430`: pad them with members where their layout is another".to_owned()),
+        ),
+        ErrorKind::InvalidToken(TokenValue::Layout, _) => (
+            "a member of a block has no `layout` of its own".to_owned(),
+            Some("let the members be in the order of their places, with others between them as padding".to_owned()),
         ),
         ErrorKind::NotImplemented(_) => (
             plain(),

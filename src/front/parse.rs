@@ -274,7 +274,8 @@ fn invalid_at(
         reasons.push(reason.to_string());
         next = reason.source();
     }
-    let message = uncapitalised(&error.as_inner().to_string());
+    // What GLSL's reader made has no name.
+    let message = uncapitalised(&error.as_inner().to_string()).replace(" '' is", " is");
     let labelled = error
         .spans()
         .fold(located(Diagnostic::error(message)), |d, (span, remark)| {
@@ -283,7 +284,28 @@ fn invalid_at(
     let explained = reasons
         .iter()
         .fold(labelled, |d, reason| d.with_reason(uncapitalised(reason)));
-    (explained, subject(error.as_inner()).map(str::to_owned))
+    let advised = match reasons.iter().find_map(|reason| way_out(reason)) {
+        Some(advice) => explained.with_note(advice),
+        None => explained,
+    };
+    (advised, subject(error.as_inner()).map(str::to_owned))
+}
+
+/// What to do about a reason of naga's validator that does not say it itself.
+fn way_out(reason: &str) -> Option<&'static str> {
+    let of = [
+        (
+            "Multiple bindings at location",
+            "give each input a location of its own: `@location(1)`, in GLSL `layout(location = 1) in`",
+        ),
+        (
+            "Base type ",
+            "give each texture and each sampler a variable and a binding of its own",
+        ),
+    ];
+    of.iter()
+        .find(|(known, _)| reason.starts_with(known))
+        .map(|(_, advice)| *advice)
 }
 
 /// Where statements of a module are nested too deep for what is behind the reader.

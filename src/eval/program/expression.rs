@@ -1,8 +1,8 @@
 //! Lowers expressions: access to variables, buffers and composites, textures, and operations.
 
-use super::Refused;
 use super::ir::{Detail, Id, Node, Question, Sample, SlotId, TexelLoad};
 use super::lower::{Entity, Lowering, Pointer, Root, kind_of};
+use super::refused::{Refused, Unsupported};
 use lodc_passes::semantics::{Kind, Op, Operation, Scalars, Shape, expand};
 use naga::{
     AddressSpace, DerivativeAxis, DerivativeControl, Expression, GlobalVariable, Handle,
@@ -70,7 +70,7 @@ impl Lowering<'_> {
             }
             Expression::FunctionArgument(index) => match self.argument(index) {
                 Some(entity) => Ok(entity),
-                None => self.refuse("an argument that is not there"),
+                None => self.refuse(Unsupported::Invalid("an argument that is not there")),
             },
             Expression::GlobalVariable(global) => self.global_variable(global),
             Expression::LocalVariable(local) => Ok(Entity::Pointer(Pointer {
@@ -101,10 +101,14 @@ impl Lowering<'_> {
                 let entity = self.expression(array)?;
                 let pointer = self.pointer(entity)?;
                 let TypeInner::Array { stride, .. } = self.pointee(array)? else {
-                    return self.refuse("the length of something that is not an array");
+                    return self.refuse(Unsupported::Invalid(
+                        "the length of something that is not an array",
+                    ));
                 };
                 let Root::Buffer(buffer) = pointer.root else {
-                    return self.refuse("the length of an array outside of a buffer");
+                    return self.refuse(Unsupported::Invalid(
+                        "the length of an array outside of a buffer",
+                    ));
                 };
                 let length = self.length(buffer, pointer.offset, stride);
                 Ok(self.list([length]))
@@ -116,17 +120,19 @@ impl Lowering<'_> {
             | Expression::Math { .. }
             | Expression::As { .. } => self.operation(handle, expression),
             // A call gives its result a meaning before anything reads it.
-            Expression::CallResult(_) => self.refuse("a value that is read before it is computed"),
-            Expression::AtomicResult { .. } => self.refuse("an atomic operation"),
-            Expression::WorkGroupUniformLoadResult { .. } => self.refuse("workgroup memory"),
+            Expression::CallResult(_) => self.refuse(Unsupported::Invalid(
+                "a value that is read before it is computed",
+            )),
+            Expression::AtomicResult { .. } => self.refuse(Unsupported::Atomic),
+            Expression::WorkGroupUniformLoadResult { .. } => self.refuse(Unsupported::Workgroup),
             Expression::RayQueryVertexPositions { .. }
             | Expression::RayQueryProceedResult
-            | Expression::RayQueryGetIntersection { .. } => self.refuse("a ray query"),
+            | Expression::RayQueryGetIntersection { .. } => self.refuse(Unsupported::RayQuery),
             Expression::SubgroupBallotResult | Expression::SubgroupOperationResult { .. } => {
-                self.refuse("a subgroup operation")
+                self.refuse(Unsupported::Subgroup)
             }
             Expression::CooperativeLoad { .. } | Expression::CooperativeMultiplyAdd { .. } => {
-                self.refuse("a cooperative matrix")
+                self.refuse(Unsupported::CooperativeMatrix)
             }
         }
     }
@@ -137,19 +143,19 @@ impl Lowering<'_> {
         expression: &Expression,
     ) -> Result<Entity, Refused> {
         let Some((operation, operands)) = Operation::of(expression) else {
-            return self.refuse("an operation that is not known");
+            return self.refuse(Unsupported::Invalid("an operation that is not known"));
         };
         let module = self.module;
         // The result tells of widths that operands do not have: a conversion to f16, say.
         let facts = self.frame.facts.clone();
         let result = facts.types.get(handle, &module.types);
         if Shape::of(result).is_none() && !matches!(result, TypeInner::Struct { .. }) {
-            return self.refuse("numbers of 16 or 64 bits");
+            return self.refuse(Unsupported::Wide);
         }
         let mut given = Vec::with_capacity(operands.len());
         for &operand in &operands {
             let Some(shape) = Shape::of(facts.types.get(operand, &module.types)) else {
-                return self.refuse("numbers of 16 or 64 bits");
+                return self.refuse(Unsupported::Wide);
             };
             let entity = self.expression(operand)?;
             given.push((shape, self.components(entity)?));
@@ -157,7 +163,7 @@ impl Lowering<'_> {
         let given: Vec<(Shape, &[Id])> = given.iter().map(|(s, v)| (*s, &v[..])).collect();
         match expand(self, operation, &given) {
             Some(values) => Ok(self.list(values)),
-            None => self.refuse("an operation that is not known"),
+            None => self.refuse(Unsupported::Invalid("an operation that is not known")),
         }
     }
 
@@ -191,33 +197,42 @@ impl Lowering<'_> {
                 return match self.module.types[variable.ty].inner {
                     TypeInner::Image { .. } => Ok(Entity::Image(handle)),
                     TypeInner::Sampler { .. } => Ok(Entity::Sampler(handle)),
-                    TypeInner::BindingArray { .. } => self.refuse("an array of bindings"),
-                    _ => self.refuse("a ray query"),
+                    TypeInner::BindingArray { .. } => {
+                        self.refuse_read(Unsupported::BindingArray, handle)
+                    }
+                    _ => self.refuse_read(Unsupported::RayQuery, handle),
                 };
             }
             AddressSpace::Private => match self.private(handle) {
                 Some(variable) => Root::Variable(variable),
-                None => return self.refuse("a private variable that is not there"),
+                None => {
+                    return self.refuse_read(
+                        Unsupported::Invalid("a private variable that is not there"),
+                        handle,
+                    );
+                }
             },
             AddressSpace::Uniform | AddressSpace::Storage { .. } => {
                 if let AddressSpace::Storage { access } = variable.space
                     && access.contains(StorageAccess::ATOMIC)
                 {
-                    return self.refuse("an atomic operation");
+                    return self.refuse_read(Unsupported::Atomic, handle);
                 }
                 if let TypeInner::BindingArray { .. } = self.module.types[variable.ty].inner {
-                    return self.refuse("an array of bindings");
+                    return self.refuse_read(Unsupported::BindingArray, handle);
                 }
                 let binding = self.binding(handle)?;
                 Root::Buffer(place(&mut self.ir.buffers, binding))
             }
-            AddressSpace::Immediate => return self.refuse("immediate data"),
+            AddressSpace::Immediate => return self.refuse_read(Unsupported::Immediate, handle),
             AddressSpace::WorkGroup | AddressSpace::TaskPayload => {
-                return self.refuse("workgroup memory");
+                return self.refuse_read(Unsupported::Workgroup, handle);
             }
             AddressSpace::Function
             | AddressSpace::RayPayload
-            | AddressSpace::IncomingRayPayload => return self.refuse("ray tracing"),
+            | AddressSpace::IncomingRayPayload => {
+                return self.refuse_read(Unsupported::RayQuery, handle);
+            }
         };
         Ok(Entity::Pointer(Pointer {
             root,
@@ -229,7 +244,7 @@ impl Lowering<'_> {
     fn binding(&self, handle: Handle<GlobalVariable>) -> Result<(u32, u32), Refused> {
         match &self.module.global_variables[handle].binding {
             Some(binding) => Ok((binding.group, binding.binding)),
-            None => self.refuse("a resource without a binding"),
+            None => self.refuse_read(Unsupported::Unbound, handle),
         }
     }
 
@@ -246,7 +261,7 @@ impl Lowering<'_> {
                 let ty = facts.types.get(base, &module.types);
                 self.access_value(first, ty, index)
             }
-            _ => self.refuse("access to a resource"),
+            _ => self.refuse(Unsupported::Invalid("access to a resource")),
         }
     }
 
@@ -264,7 +279,7 @@ impl Lowering<'_> {
                 let scalars = self.count_of(base).unwrap_or(0);
                 Ok((scalars, stride, size))
             }
-            _ => self.refuse("access to a resource"),
+            _ => self.refuse(Unsupported::Invalid("access to a resource")),
         }
     }
 
@@ -310,7 +325,7 @@ impl Lowering<'_> {
                         self.apply(Op::SubWord, &[length, one])
                     }
                     (None, Root::Variable(_)) => {
-                        return self.refuse("an array whose size is not known");
+                        return self.refuse(Unsupported::UnknownSize);
                     }
                 };
                 let index = self.apply(Op::MinUint, &[index, last]);
@@ -341,7 +356,7 @@ impl Lowering<'_> {
             }
             let count = match members.get(index) {
                 Some(member) => self.count_of(member.ty)? as usize,
-                None => return self.refuse("a member that is not there"),
+                None => return self.refuse(Unsupported::Invalid("a member that is not there")),
             };
             return Ok(Entity::Values {
                 first: first + offset,
@@ -350,7 +365,7 @@ impl Lowering<'_> {
         }
         let (width, _, size) = self.elements(ty)?;
         let (width, Some(size)) = (width as usize, size) else {
-            return self.refuse("an array whose size is not known");
+            return self.refuse(Unsupported::UnknownSize);
         };
         let index = match *index {
             Index::Known(index) => {
@@ -465,7 +480,7 @@ impl Lowering<'_> {
         match *ty {
             TypeInner::Scalar(scalar) => {
                 if scalar.width != 4 {
-                    return self.refuse("numbers of 16 or 64 bits");
+                    return self.refuse(Unsupported::Wide);
                 }
                 out.push(self.fetch(buffer, kind_of(scalar.kind), offset, index));
             }
@@ -488,7 +503,7 @@ impl Lowering<'_> {
             }
             TypeInner::Array { base, size, stride } => {
                 let Some(size) = self.array_size(size)? else {
-                    return self.refuse("an array whose size is not known");
+                    return self.refuse(Unsupported::UnknownSize);
                 };
                 self.count_of(base)?;
                 for i in 0..size {
@@ -502,8 +517,12 @@ impl Lowering<'_> {
                     self.load_buffer(buffer, inner, offset + member.offset, index, out)?;
                 }
             }
-            TypeInner::Atomic(_) => return self.refuse("an atomic operation"),
-            _ => return self.refuse("a pointer or a resource inside a value"),
+            TypeInner::Atomic(_) => return self.refuse(Unsupported::Atomic),
+            _ => {
+                return self.refuse(Unsupported::Invalid(
+                    "a pointer or a resource inside a value",
+                ));
+            }
         }
         Ok(())
     }
@@ -541,18 +560,20 @@ impl Lowering<'_> {
         image: Handle<Expression>,
     ) -> Result<(u32, ImageDimension, ImageClass), Refused> {
         let Entity::Image(handle) = self.expression(image)? else {
-            return self.refuse("an array of bindings");
+            return self.refuse(Unsupported::BindingArray);
         };
         let ty = self.module.global_variables[handle].ty;
         let TypeInner::Image { dim, class, .. } = self.module.types[ty].inner else {
-            return self.refuse("an array of bindings");
+            return self.refuse_read(Unsupported::BindingArray, handle);
         };
         match class {
             ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => {
-                return self.refuse("a multisampled texture");
+                return self.refuse_read(Unsupported::Multisampled, handle);
             }
-            ImageClass::External => return self.refuse("an external texture"),
-            ImageClass::Storage { .. } => return self.refuse("a storage texture"),
+            ImageClass::External => return self.refuse_read(Unsupported::ExternalTexture, handle),
+            ImageClass::Storage { .. } => {
+                return self.refuse_read(Unsupported::StorageTexture, handle);
+            }
             ImageClass::Sampled { .. } | ImageClass::Depth { .. } => {}
         }
         let binding = self.binding(handle)?;
@@ -639,11 +660,11 @@ impl Lowering<'_> {
             clamp_to_edge,
         } = *expression
         else {
-            return self.refuse("an operation that is not known");
+            return self.refuse(Unsupported::Invalid("an operation that is not known"));
         };
         let (texture, _, class) = self.image(image)?;
         let Entity::Sampler(sampler) = self.expression(sampler)? else {
-            return self.refuse("an array of bindings");
+            return self.refuse(Unsupported::BindingArray);
         };
         let sampler = self.binding(sampler)?;
         let sampler = place(&mut self.ir.samplers, sampler);
@@ -659,7 +680,9 @@ impl Lowering<'_> {
             for (to, id) in offsets.iter_mut().zip(self.components(entity)?) {
                 match self.ir.values[id as usize].constant {
                     Some(word) => *to = word as i32,
-                    None => return self.refuse("an offset that is not constant"),
+                    None => {
+                        return self.refuse(Unsupported::Invalid("an offset that is not constant"));
+                    }
                 }
             }
         }
@@ -710,7 +733,7 @@ impl Lowering<'_> {
             ..
         } = *expression
         else {
-            return self.refuse("an operation that is not known");
+            return self.refuse(Unsupported::Invalid("an operation that is not known"));
         };
         let (texture, _, class) = self.image(image)?;
         let coordinates = self.signed(coordinate)?;
@@ -754,7 +777,7 @@ impl Lowering<'_> {
             }
             ImageQuery::NumLevels => (Question::Levels, None, 1),
             ImageQuery::NumLayers => (Question::Layers, None, 1),
-            ImageQuery::NumSamples => return self.refuse("a multisampled texture"),
+            ImageQuery::NumSamples => return self.refuse(Unsupported::Multisampled),
         };
         let values: Vec<Id> = (0..count).map(|_| self.ir.value(Kind::W)).collect();
         let mut results = [None; 3];

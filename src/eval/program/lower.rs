@@ -5,8 +5,8 @@
 //! a loop or an exit makes it necessary. Buffers and everything computed from them and from constants alone
 //! goes to the prologue, which runs once for a draw.
 
-use super::Refused;
 use super::ir::{Case, Id, Ir, Label, NONE, Node, Slot, SlotId};
+use super::refused::{Refused, Unsupported};
 use lodc_passes::semantics::{self, Kind, Op, Scalars};
 use lodc_passes::{Work, cost};
 use naga::front::Typifier;
@@ -214,7 +214,7 @@ impl<'a> Lowering<'a> {
         if let Some((last, _)) = module.global_expressions.iter().next_back() {
             types
                 .grow(last, &module.global_expressions, &context)
-                .map_err(|e| refused(e.to_string(), Span::UNDEFINED))?;
+                .map_err(|e| Refused::invalid(e.to_string()))?;
         }
         let globals = Frame {
             expressions: &module.global_expressions,
@@ -263,8 +263,21 @@ impl<'a> Lowering<'a> {
         Ok(lowering.ir)
     }
 
-    pub(super) fn refuse<T>(&self, what: impl Into<String>) -> Result<T, Refused> {
-        Err(refused(what, self.span))
+    /// Refuses what is lowered now; what has no place of its own, at the variable that it reads.
+    pub(super) fn refuse_read<T>(
+        &self,
+        what: Unsupported,
+        of: Handle<GlobalVariable>,
+    ) -> Result<T, Refused> {
+        let span = match self.span.is_defined() {
+            true => self.span,
+            false => self.module.global_variables.get_span(of),
+        };
+        Err(Refused::new(what, span))
+    }
+
+    pub(super) fn refuse<T>(&self, what: Unsupported) -> Result<T, Refused> {
+        Err(Refused::new(what, self.span))
     }
 
     // Values and nodes.
@@ -465,7 +478,7 @@ impl<'a> Lowering<'a> {
                 let each = self.count_of(*base)?;
                 match self.array_size(*size)? {
                     Some(size) => size.checked_mul(each),
-                    None => return self.refuse("an array whose size is not known"),
+                    None => return self.refuse(Unsupported::UnknownSize),
                 }
             }
             TypeInner::Struct { members, .. } => {
@@ -476,11 +489,11 @@ impl<'a> Lowering<'a> {
                 }
                 sum
             }
-            other => return self.refuse(type_name(other)),
+            other => return self.refuse(Unsupported::of_type(other)),
         };
         match count {
             Some(count) if count <= MAX_SCALARS => Ok(count),
-            _ => self.refuse("a value of more than 65536 scalars"),
+            _ => self.refuse(Unsupported::ManyScalars),
         }
     }
 
@@ -495,7 +508,7 @@ impl<'a> Lowering<'a> {
                     id if self.ir.values[id as usize].constant.is_some() => {
                         Ok(self.ir.values[id as usize].constant)
                     }
-                    _ => self.refuse("an array whose size is not known"),
+                    _ => self.refuse(Unsupported::UnknownSize),
                 }
             }
         }
@@ -513,7 +526,7 @@ impl<'a> Lowering<'a> {
             | TypeInner::Vector { scalar, .. }
             | TypeInner::Matrix { scalar, .. } => {
                 if scalar.kind != ScalarKind::Bool && scalar.width != 4 {
-                    return self.refuse("numbers of 16 or 64 bits");
+                    return self.refuse(Unsupported::Wide);
                 }
                 let count = self.count_of_inner(inner)?;
                 out.extend(std::iter::repeat_n(scalar.kind, count as usize));
@@ -533,7 +546,7 @@ impl<'a> Lowering<'a> {
                     self.kinds(&module.types[member.ty].inner, out)?;
                 }
             }
-            other => return self.refuse(type_name(other)),
+            other => return self.refuse(Unsupported::of_type(other)),
         }
         Ok(())
     }
@@ -551,7 +564,7 @@ impl<'a> Lowering<'a> {
 
     fn examine(&mut self, function: &'a Function) -> Result<Rc<Facts>, Refused> {
         let module = self.module;
-        let types = cost::types(module, function).map_err(|e| refused(e.to_string(), self.span))?;
+        let types = cost::types(module, function).map_err(|e| Refused::invalid(e.to_string()))?;
         let works = cost::of_expressions(module, &function.expressions, &types);
         let mut facts = Facts {
             indexed: vec![false; function.local_variables.len()],
@@ -725,7 +738,7 @@ impl<'a> Lowering<'a> {
 
     fn store(&mut self, pointer: Pointer, ty: &TypeInner, value: Entity) -> Result<(), Refused> {
         let Root::Variable(variable) = pointer.root else {
-            return self.refuse("a write to a buffer");
+            return self.refuse(Unsupported::BufferWrite);
         };
         let mut kinds = Vec::new();
         self.kinds(ty, &mut kinds)?;
@@ -822,9 +835,12 @@ impl<'a> Lowering<'a> {
         let module = self.module;
         let early = facts.early;
         let mut locals = Vec::new();
+        let called_from = self.span;
         for (handle, local) in function.local_variables.iter() {
+            self.span = function.local_variables.get_span(handle);
             locals.push(self.variable(local.ty, facts.indexed[handle.index()])?);
         }
+        self.span = called_from;
         let mut result = None;
         if early {
             let label = self.label();
@@ -951,7 +967,7 @@ impl<'a> Lowering<'a> {
                 break;
             }
             if self.nodes > MAX_NODES {
-                return self.refuse("a program that is too large once its calls are inlined");
+                return self.refuse(Unsupported::TooLarge);
             }
             self.span = *span;
             if let Statement::Return { value } = statement {
@@ -1018,11 +1034,11 @@ impl<'a> Lowering<'a> {
             } => self.repeat(body, continuing, *break_if)?,
             Statement::Break => match self.frame.breaks.last() {
                 Some(&label) => self.exit(label),
-                None => return self.refuse("a break outside of a loop"),
+                None => return self.refuse(Unsupported::Invalid("a break outside of a loop")),
             },
             Statement::Continue => match self.frame.continues.last() {
                 Some(&label) => self.exit(label),
-                None => return self.refuse("a continue outside of a loop"),
+                None => return self.refuse(Unsupported::Invalid("a continue outside of a loop")),
             },
             Statement::Return { .. } => {}
             Statement::Kill => {
@@ -1060,21 +1076,23 @@ impl<'a> Lowering<'a> {
                 }
             }
             Statement::ControlBarrier(_) | Statement::MemoryBarrier(_) => {
-                return self.refuse("a barrier");
+                return self.refuse(Unsupported::Barrier);
             }
-            Statement::ImageStore { .. } => return self.refuse("a write to a storage texture"),
+            Statement::ImageStore { .. } => return self.refuse(Unsupported::StorageTextureWrite),
             Statement::Atomic { .. } | Statement::ImageAtomic { .. } => {
-                return self.refuse("an atomic operation");
+                return self.refuse(Unsupported::Atomic);
             }
-            Statement::WorkGroupUniformLoad { .. } => return self.refuse("workgroup memory"),
-            Statement::RayQuery { .. } => return self.refuse("a ray query"),
-            Statement::RayPipelineFunction(_) => return self.refuse("ray tracing"),
+            Statement::WorkGroupUniformLoad { .. } => return self.refuse(Unsupported::Workgroup),
+            Statement::RayQuery { .. } => return self.refuse(Unsupported::RayQuery),
+            Statement::RayPipelineFunction(_) => return self.refuse(Unsupported::RayQuery),
             Statement::SubgroupBallot { .. }
             | Statement::SubgroupGather { .. }
             | Statement::SubgroupCollectiveOperation { .. } => {
-                return self.refuse("a subgroup operation");
+                return self.refuse(Unsupported::Subgroup);
             }
-            Statement::CooperativeStore { .. } => return self.refuse("a cooperative matrix"),
+            Statement::CooperativeStore { .. } => {
+                return self.refuse(Unsupported::CooperativeMatrix);
+            }
         }
         Ok(())
     }
@@ -1173,7 +1191,9 @@ impl<'a> Lowering<'a> {
             entity => return Ok(entity),
         }
         if !self.frame.on_demand && !self.frame.expressions[handle].needs_pre_emit() {
-            return self.refuse("a value that is read before it is computed");
+            return self.refuse(Unsupported::Invalid(
+                "a value that is read before it is computed",
+            ));
         }
         let entity = self.evaluate(handle)?;
         self.frame.values[handle.index()] = entity;
@@ -1210,7 +1230,7 @@ impl<'a> Lowering<'a> {
     ) -> Result<Entity, Refused> {
         match self.module.overrides[handle].init {
             Some(init) => self.global_expression(init),
-            None => self.refuse("an override without a default value"),
+            None => self.refuse(Unsupported::OverrideWithoutDefault),
         }
     }
 
@@ -1230,21 +1250,23 @@ impl<'a> Lowering<'a> {
     pub(super) fn components(&self, entity: Entity) -> Result<Vec<Id>, Refused> {
         match entity {
             Entity::Values { first, count } => Ok(self.flat[first..first + count].to_vec()),
-            _ => self.refuse("a pointer or a resource used as a value"),
+            _ => self.refuse(Unsupported::Invalid(
+                "a pointer or a resource used as a value",
+            )),
         }
     }
 
     pub(super) fn scalar(&self, entity: Entity) -> Result<Id, Refused> {
         match entity {
             Entity::Values { first, count: 1 } => Ok(self.flat[first]),
-            _ => self.refuse("a composite used as a scalar"),
+            _ => self.refuse(Unsupported::Invalid("a composite used as a scalar")),
         }
     }
 
     pub(super) fn pointer(&self, entity: Entity) -> Result<Pointer, Refused> {
         match entity {
             Entity::Pointer(pointer) => Ok(pointer),
-            _ => self.refuse("a value used as a pointer"),
+            _ => self.refuse(Unsupported::Invalid("a value used as a pointer")),
         }
     }
 
@@ -1260,7 +1282,7 @@ impl<'a> Lowering<'a> {
             TypeInner::ValuePointer {
                 size: None, scalar, ..
             } => Ok(TypeInner::Scalar(scalar)),
-            _ => self.refuse("a value used as a pointer"),
+            _ => self.refuse(Unsupported::Invalid("a value used as a pointer")),
         }
     }
 
@@ -1270,34 +1292,17 @@ impl<'a> Lowering<'a> {
                 let kind = kind_of(constant.shape.kind());
                 Ok(self.constant(kind, constant.words[0]))
             }
-            None => self.refuse("numbers of 16 or 64 bits"),
+            None => self.refuse(Unsupported::Wide),
         }
     }
 }
 
 static EMPTY_LOCALS: &Arena<naga::LocalVariable> = &Arena::new();
 
-pub(super) fn refused(what: impl Into<String>, span: Span) -> Refused {
-    Refused {
-        what: what.into(),
-        span,
-    }
-}
-
 /// How a scalar is kept: bools and integers are words.
 pub(super) fn kind_of(kind: ScalarKind) -> Kind {
     match kind {
         ScalarKind::Float | ScalarKind::AbstractFloat => Kind::F,
         _ => Kind::W,
-    }
-}
-
-fn type_name(inner: &TypeInner) -> &'static str {
-    match inner {
-        TypeInner::CooperativeMatrix { .. } => "a cooperative matrix",
-        TypeInner::Atomic(_) => "an atomic operation",
-        TypeInner::AccelerationStructure { .. } | TypeInner::RayQuery { .. } => "a ray query",
-        TypeInner::BindingArray { .. } => "an array of bindings",
-        _ => "a pointer or a resource inside a value",
     }
 }

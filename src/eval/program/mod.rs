@@ -11,12 +11,13 @@ pub(super) mod code;
 mod expression;
 mod ir;
 mod lower;
+mod refused;
 mod registers;
 mod simplify;
 mod uniform;
 
-use crate::Diagnostic;
-use crate::front::Source;
+pub use refused::Refused;
+
 use lodc_passes::Work;
 use naga::{
     Binding, Expression, FunctionArgument, FunctionResult, Handle, Interpolation, Module,
@@ -54,30 +55,6 @@ pub struct Slot {
     pub kind: ScalarKind,
     /// How it is interpolated; `None` for built-ins and for integers' `Flat`-less vertex inputs.
     pub interpolation: Option<Interpolation>,
-}
-
-/// Something the evaluator does not run (storage writes, ray queries, subgroup operations, ...).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Refused {
-    /// What it is, lower case.
-    pub what: String,
-    /// Where, in the text that the module was parsed from.
-    pub span: Span,
-}
-
-impl Refused {
-    /// The same as a message at its place in the source that was compiled.
-    pub fn at(&self, source: &Source) -> Box<Diagnostic> {
-        source
-            .error(
-                format!("lodc cannot evaluate {}", self.what),
-                self.span,
-                "here",
-            )
-            .with_note(
-                "errors are measured by running the shader on the CPU, which does not do this",
-            )
-    }
 }
 
 impl Program {
