@@ -18,6 +18,8 @@ mod fixtures;
 pub mod cli;
 #[cfg(feature = "search")]
 pub mod eval;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 #[cfg(feature = "search")]
 pub mod report;
 #[cfg(feature = "search")]

@@ -193,6 +193,8 @@ fn interpolate(interpolation: Option<Interpolation>, sampling: Option<Sampling>)
         Some(Interpolation::Perspective | Interpolation::PerVertex) | None => "perspective",
     };
     let at = match sampling {
+        // A GPU takes the stages together only when both say it, or neither.
+        Some(Sampling::Center) if kind != "flat" => ", center",
         Some(Sampling::Center) | None => "",
         Some(Sampling::Centroid) => ", centroid",
         Some(Sampling::Sample) => ", sample",

@@ -18,7 +18,7 @@ use crate::front::names::{listed, whole_word, words};
 use crate::front::{Input, Source, Stages, inputs, read_text, validate};
 use crate::{Diagnostic, Result};
 use naga::{
-    Binding, GlobalVariable, Handle, ImageClass, ImageDimension, Scalar, ScalarKind, Span,
+    Binding, GlobalVariable, Handle, ImageClass, ImageDimension, Module, Scalar, ScalarKind, Span,
     TypeInner, VectorSize,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,6 +34,9 @@ pub struct SceneLighting {
     pub file: String,
     /// What the evaluator runs.
     pub(super) lighting: Arc<Lighting>,
+    source: Arc<Source>,
+    /// The vertex stage that lodc supplies, when the shader has none; its one entry point is at 0.
+    supplied: Option<Arc<Module>>,
     buffers: Vec<Buffer>,
     /// The bindings that are the same in every picture.
     constant: Bindings,
@@ -53,6 +56,25 @@ impl SceneLighting {
     /// How many samples of its values there are.
     pub(super) fn samples(&self) -> usize {
         self.buffers.iter().map(Buffer::samples).max().unwrap_or(1)
+    }
+
+    /// The vertex stage: a module, and the place of its entry point.
+    pub fn vertex(&self) -> (&Module, usize) {
+        match (&self.supplied, self.source.vertex_entry()) {
+            (None, Some((entry, _))) => (&self.source.module, entry),
+            (Some(supplied), _) => (supplied, 0),
+            (None, None) => unreachable!("a stage is supplied where there is none"),
+        }
+    }
+
+    /// The fragment stage: a module, and the place of its entry point.
+    pub fn fragment(&self) -> (&Module, usize) {
+        (&self.source.module, self.source.fragment_entry().0)
+    }
+
+    /// What it reads of the material: group, binding, and what.
+    pub fn reads(&self) -> &[((u32, u32), Plane)] {
+        self.lighting.reads()
     }
 
     /// The frame that lights a picture of the material: its pixels are the picture's fine pixels.
@@ -187,7 +209,7 @@ pub(super) fn resolve(
                 .push(*unread(material, output, file.get_ref()));
         }
     }
-    let vertex = vertex(&source)?;
+    let (supplied, vertex) = vertex(&source)?;
     let fragment = Program::compile(&source.module, source.fragment_entry().0, &[])
         .map_err(|refused| refused.at(&source))?;
 
@@ -256,6 +278,8 @@ pub(super) fn resolve(
                 .map(|read| (read.at, read.plane))
                 .collect(),
         )),
+        source: Arc::new(source),
+        supplied: supplied.map(Arc::new),
         buffers,
         constant,
         screen: Arc::new(Object::Screen.mesh(0)),
@@ -656,8 +680,8 @@ fn infer(name: &str, outputs: &[Output]) -> Option<Option<u32>> {
     }
 }
 
-/// The vertex stage of the lighting: its own, or one that covers the screen.
-fn vertex(source: &Source) -> Result<Program> {
+/// The vertex stage of the lighting: its own, or one that covers the screen, with its module.
+fn vertex(source: &Source) -> Result<(Option<Module>, Program)> {
     if let Some((entry, _)) = source.vertex_entry() {
         let mut read = inputs(source, entry).into_iter();
         if let Some(input) = read.find(|i| matches!(i.binding, Binding::Location { .. })) {
@@ -669,7 +693,8 @@ fn vertex(source: &Source) -> Result<Program> {
                 )
                 .with_note("a full-screen shader makes its triangle of `@builtin(vertex_index)`; leave the stage out, and lodc supplies one"));
         }
-        return Program::compile(&source.module, entry, &[]).map_err(|refused| refused.at(source));
+        let own = Program::compile(&source.module, entry, &[]);
+        return Ok((None, own.map_err(|refused| refused.at(source))?));
     }
     let read = inputs(source, source.fragment_entry().0);
     let mut members = String::new();
@@ -714,7 +739,8 @@ fn vertex(source: &Source) -> Result<Program> {
     let module =
         naga::front::wgsl::parse_str(&text).map_err(|error| broken(error.emit_to_string(&text)))?;
     validate(&module).map_err(|error| broken(error.emit_to_string(&text)))?;
-    Program::compile(&module, 0, &[]).map_err(|refused| broken(refused.what))
+    let program = Program::compile(&module, 0, &[]).map_err(|refused| broken(refused.what))?;
+    Ok((Some(module), program))
 }
 
 #[cfg(test)]

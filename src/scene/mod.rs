@@ -461,9 +461,19 @@ impl Scene {
     /// What lights a frame of this scene in a deferred scene: made for the coverage that its fragments are of.
     pub fn lit(&self, frame: &Frame, coverage: &Coverage) -> Option<Lit> {
         let lighting = self.lighting.as_ref()?;
+        Some(Lit::new(
+            &lighting.lighting,
+            self.lighting_frame(frame)?,
+            coverage,
+        ))
+    }
+
+    /// The frame of the pass that lights a frame of this scene, in a deferred scene: its pixels are the frame's
+    /// fine pixels.
+    pub fn lighting_frame(&self, frame: &Frame) -> Option<Frame> {
+        let lighting = self.lighting.as_ref()?;
         let pose = self.pose(frame.shot.direction, frame.shot.distance);
-        let screen = lighting.frame(frame, &pose, &self.sphere);
-        Some(Lit::new(&lighting.lighting, screen, coverage))
+        Some(lighting.frame(frame, &pose, &self.sphere))
     }
 
     fn pose(&self, direction: DVec3, distance: f64) -> Pose {

@@ -46,6 +46,11 @@ impl Lighting {
         }
     }
 
+    /// What it reads of the material: group, binding, and what.
+    pub fn reads(&self) -> &[((u32, u32), Plane)] {
+        &self.reads
+    }
+
     /// Images in which nothing is drawn.
     fn clear(&self, [width, height]: [u32; 2]) -> GBuffer {
         let spare = self.spare.lock().ok().and_then(|mut spare| {

@@ -17,6 +17,9 @@ mod tests;
 mod triangle;
 mod vertices;
 
+#[cfg(feature = "gpu")]
+pub(crate) use vertices::attribute;
+
 use super::lane::{LANES, Mask, Words};
 use super::machine::{Bindings, Profile};
 use super::program::{Program, Slot};

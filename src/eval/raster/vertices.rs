@@ -66,8 +66,7 @@ fn feed(
     lanes: usize,
     frame: &Frame,
 ) {
-    let mesh = &*frame.mesh;
-    let attribute = match slot.binding {
+    let location = match slot.binding {
         Binding::BuiltIn(BuiltIn::VertexIndex) => {
             for (lane, word) in words[..lanes].iter_mut().enumerate() {
                 *word = (first - start + lane) as u32;
@@ -76,24 +75,33 @@ fn feed(
         }
         // One instance, and every base is 0.
         Binding::BuiltIn(_) => return words[..lanes].fill(0),
-        Binding::Location { location, .. } => frame.attributes.get(&location),
+        Binding::Location { location, .. } => location,
     };
-    if let Some(Attribute::Fixed(fixed)) = attribute {
-        let word = fixed.get(slot.component).copied().unwrap_or(0);
-        return words[..lanes].fill(word);
-    }
     for (lane, word) in words[..lanes].iter_mut().enumerate() {
-        let value = attribute
-            .and_then(|&attribute| component(mesh, attribute, first + lane, slot.component))
-            .unwrap_or(if slot.component == 3 { 1.0 } else { 0.0 });
-        *word = match slot.kind {
-            ScalarKind::Uint => value as u32,
-            ScalarKind::Sint => (value as i32).cast_unsigned(),
-            ScalarKind::Bool => u32::from(value != 0.0),
-            ScalarKind::Float | ScalarKind::AbstractInt | ScalarKind::AbstractFloat => {
-                value.to_bits()
-            }
-        };
+        let fed = (location, slot.component);
+        *word = self::attribute(frame, fed, slot.kind, first + lane);
+    }
+}
+
+/// The word that feeds a component of the input at a location, for a vertex of the frame's mesh.
+pub(crate) fn attribute(
+    frame: &Frame,
+    (location, place): (u32, usize),
+    kind: ScalarKind,
+    vertex: usize,
+) -> u32 {
+    let attribute = frame.attributes.get(&location);
+    if let Some(Attribute::Fixed(fixed)) = attribute {
+        return fixed.get(place).copied().unwrap_or(0);
+    }
+    let value = attribute
+        .and_then(|&attribute| component(&frame.mesh, attribute, vertex, place))
+        .unwrap_or(if place == 3 { 1.0 } else { 0.0 });
+    match kind {
+        ScalarKind::Uint => value as u32,
+        ScalarKind::Sint => (value as i32).cast_unsigned(),
+        ScalarKind::Bool => u32::from(value != 0.0),
+        ScalarKind::Float | ScalarKind::AbstractInt | ScalarKind::AbstractFloat => value.to_bits(),
     }
 }
 

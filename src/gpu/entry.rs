@@ -1,0 +1,552 @@
+//! Entry points around a shader's own, so that a GPU draws what the evaluator draws.
+//!
+//! The shader's entry point becomes an ordinary function, unchanged, and one that calls it takes its place:
+//! - The vertex one moves clip positions, so that pixels are sampled off their centres.
+//! - The fragment one says positions in the frame's pixels, whatever the grid and the offset, and returns each colour
+//!   as four components, what the shader leaves out 0 and alpha 1.
+//!
+//! What they need of a frame is in a uniform buffer of their own ([`Place`]), so that one pipeline draws all frames.
+
+use naga::{
+    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, EntryPoint, Expression,
+    Function, FunctionArgument, FunctionResult, GlobalVariable, Handle, ImageClass, ImageDimension,
+    Interpolation, Literal, Module, ResourceBinding, Scalar, ScalarKind, Span, Statement,
+    StructMember, SwizzleComponent, Type, TypeInner, VectorSize,
+};
+use std::num::NonZeroU32;
+
+/// The name of every entry point that is made here.
+pub(super) const NAME: &str = "drawn";
+
+/// Where a frame's fine pixels are: two vec4f, little-endian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    /// What is added to clip positions, over their w.
+    shift: [f32; 2],
+    /// Pixels to a fine pixel.
+    scale: f32,
+    /// Where in a pixel it is sampled, from the centre.
+    offset: [f32; 2],
+}
+
+impl Place {
+    /// The place of a picture of so many pixels, sampled by `offset` off their centres, with `grid` fine pixels to one.
+    pub(super) fn new([width, height]: [u32; 2], offset: [f32; 2], grid: u32) -> Self {
+        Self {
+            shift: [
+                -2.0 * offset[0] / width as f32,
+                2.0 * offset[1] / height as f32,
+            ],
+            scale: 1.0 / grid as f32,
+            offset,
+        }
+    }
+
+    /// As the buffer holds it.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        let [x, y] = self.shift;
+        let words = [
+            x,
+            y,
+            0.0,
+            0.0,
+            self.scale,
+            self.offset[0],
+            self.offset[1],
+            0.0,
+        ];
+        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+}
+
+/// A colour that a pipeline draws to a target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Colour {
+    /// The location at which the shader returns it.
+    pub(super) location: u32,
+    /// What the target holds of it; `None` for the bits of floats, as integers.
+    pub(super) kind: Option<ScalarKind>,
+}
+
+/// What a fragment entry point draws to; behind the colours, 1 wherever anything is drawn.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Targets {
+    /// The colours, each drawn to the target of its place in this list.
+    pub(super) colours: Vec<Colour>,
+    /// A texture of coverage, at its group and binding: where it is 0, nothing is drawn.
+    pub(super) only_where: Option<(u32, u32)>,
+}
+
+/// The module with one vertex entry point, [`NAME`], around the one at `entry`.
+pub(super) fn vertex(module: &Module, entry: usize, place: (u32, u32)) -> Module {
+    let mut around = Around::new(module, entry, place);
+    let arguments = around.arguments(|_, value| value);
+    let (result, returned) = around.call(arguments);
+    let Some((result, returned)) = result.zip(returned) else {
+        return around.finish(None, None);
+    };
+    let moved = match &around.module.types[result.ty].inner {
+        TypeInner::Struct { members, .. } => {
+            let members = members.clone();
+            let mut components = Vec::new();
+            for (index, member) in (0..).zip(&members) {
+                let value = around.emit(Expression::AccessIndex {
+                    base: returned,
+                    index,
+                });
+                components.push(match is_position(member.binding.as_ref()) {
+                    true => around.moved(value),
+                    false => value,
+                });
+            }
+            around.emit(Expression::Compose {
+                ty: result.ty,
+                components,
+            })
+        }
+        _ => around.moved(returned),
+    };
+    around.finish(Some(result), Some(moved))
+}
+
+/// The module with one fragment entry point, [`NAME`], around the one at `entry`.
+pub(super) fn fragment(
+    module: &Module,
+    entry: usize,
+    place: (u32, u32),
+    targets: &Targets,
+) -> Module {
+    let mut around = Around::new(module, entry, place);
+    let arguments = around.arguments(|around, position| around.in_pixels(position));
+    let (result, returned) = around.call(arguments);
+    if let Some(at) = targets.only_where {
+        around.only_where(at);
+    }
+    let returned = around.returned(result, returned);
+    let mut members = Vec::new();
+    let mut components = Vec::new();
+    let mut offset = 0;
+    let mut add = |around: &mut Around, binding, inner, value| {
+        let size = match inner {
+            TypeInner::Scalar(_) => 4,
+            _ => 16,
+        };
+        members.push(StructMember {
+            name: Some(format!("out_{}", letter(members.len()))),
+            ty: around.ty(inner),
+            binding: Some(binding),
+            offset,
+        });
+        components.push(value);
+        offset += size;
+    };
+    for (at, colour) in (0..).zip(&targets.colours) {
+        let found = returned.iter().find(
+            |(binding, ..)| matches!(binding, Binding::Location { location, .. } if *location == colour.location),
+        );
+        let kind = colour.kind.unwrap_or(ScalarKind::Float);
+        let mut value = around.colour(found.map(|(_, ty, value)| (*ty, *value)), kind);
+        if colour.kind.is_none() {
+            // Every device draws to integers of 32 bits, and not every one to floats of as many.
+            value = around.emit(Expression::As {
+                expr: value,
+                kind: ScalarKind::Uint,
+                convert: None,
+            });
+        }
+        let inner = four(scalar(colour.kind.unwrap_or(ScalarKind::Uint)));
+        add(&mut around, location(at), inner, value);
+    }
+    let one = around.emit(Expression::Literal(Literal::U32(1)));
+    let at = targets.colours.len() as u32;
+    add(
+        &mut around,
+        location(at),
+        TypeInner::Scalar(Scalar::U32),
+        one,
+    );
+    for (binding, ty, value) in returned {
+        if let Binding::BuiltIn(_) = binding {
+            let inner = around.module.types[ty].inner.clone();
+            add(&mut around, binding, inner, value);
+        }
+    }
+    let ty = around.ty(TypeInner::Struct {
+        members,
+        span: offset.next_multiple_of(16),
+    });
+    let value = around.emit(Expression::Compose { ty, components });
+    around.finish(Some(FunctionResult { ty, binding: None }), Some(value))
+}
+
+fn is_position(binding: Option<&Binding>) -> bool {
+    matches!(binding, Some(Binding::BuiltIn(BuiltIn::Position { .. })))
+}
+
+fn location(location: u32) -> Binding {
+    Binding::Location {
+        location,
+        // A fragment's outputs have none that matters; the validator wants integers to say so.
+        interpolation: Some(Interpolation::Flat),
+        sampling: None,
+        blend_src: None,
+        per_primitive: false,
+    }
+}
+
+fn scalar(kind: ScalarKind) -> Scalar {
+    Scalar { kind, width: 4 }
+}
+
+fn four(scalar: Scalar) -> TypeInner {
+    TypeInner::Vector {
+        size: VectorSize::Quad,
+        scalar,
+    }
+}
+
+/// A name that naga's writers keep.
+fn letter(index: usize) -> char {
+    char::from(b'a' + (index % 26) as u8)
+}
+
+/// An entry point being made around another.
+struct Around {
+    module: Module,
+    /// The entry point as it was, without its function.
+    entry: EntryPoint,
+    /// The shader's own function.
+    inner: Handle<Function>,
+    inner_result: Option<FunctionResult>,
+    place: Handle<GlobalVariable>,
+    function: Function,
+    /// The position in the fragment's arguments, as it came.
+    position: Option<Handle<Expression>>,
+}
+
+impl Around {
+    fn new(module: &Module, entry: usize, place: (u32, u32)) -> Self {
+        let mut module = module.clone();
+        let mut entry = module.entry_points.swap_remove(entry);
+        module.entry_points.clear();
+        let mut inner = std::mem::take(&mut entry.function);
+        let function = Function {
+            arguments: inner.arguments.clone(),
+            ..Function::default()
+        };
+        let inner_result = inner.result.clone();
+        inner.name = Some("shader_itself".to_owned());
+        for argument in &mut inner.arguments {
+            argument.binding = None;
+        }
+        if let Some(result) = &mut inner.result {
+            result.binding = None;
+        }
+        let inner = module.functions.append(inner, Span::UNDEFINED);
+        let vec4 = insert(&mut module, four(Scalar::F32));
+        let two = TypeInner::Array {
+            base: vec4,
+            size: ArraySize::Constant(NonZeroU32::MIN.saturating_add(1)),
+            stride: 16,
+        };
+        let ty = insert(&mut module, two);
+        let place = module.global_variables.append(
+            GlobalVariable {
+                name: Some("frame_place".to_owned()),
+                space: AddressSpace::Uniform,
+                binding: Some(ResourceBinding {
+                    group: place.0,
+                    binding: place.1,
+                }),
+                ty,
+                init: None,
+                memory_decorations: naga::MemoryDecorations::empty(),
+            },
+            Span::UNDEFINED,
+        );
+        Self {
+            module,
+            entry,
+            inner,
+            inner_result,
+            place,
+            function,
+            position: None,
+        }
+    }
+
+    fn ty(&mut self, inner: TypeInner) -> Handle<Type> {
+        insert(&mut self.module, inner)
+    }
+
+    /// A new value, computed here.
+    fn emit(&mut self, expression: Expression) -> Handle<Expression> {
+        let bare = matches!(
+            expression,
+            Expression::Literal(_)
+                | Expression::FunctionArgument(_)
+                | Expression::GlobalVariable(_)
+                | Expression::CallResult(_)
+        );
+        let value = self
+            .function
+            .expressions
+            .append(expression, Span::UNDEFINED);
+        if !bare {
+            let range = naga::Range::new_from_bounds(value, value);
+            self.push(Statement::Emit(range));
+        }
+        value
+    }
+
+    fn push(&mut self, statement: Statement) {
+        self.function.body.push(statement, Span::UNDEFINED);
+    }
+
+    fn at(&mut self, base: Handle<Expression>, index: u32) -> Handle<Expression> {
+        self.emit(Expression::AccessIndex { base, index })
+    }
+
+    fn binary(
+        &mut self,
+        op: BinaryOperator,
+        left: Handle<Expression>,
+        right: Handle<Expression>,
+    ) -> Handle<Expression> {
+        self.emit(Expression::Binary { op, left, right })
+    }
+
+    /// One of the two vectors of the frame's place.
+    fn place(&mut self, index: u32) -> Handle<Expression> {
+        let base = self.emit(Expression::GlobalVariable(self.place));
+        let pointer = self.at(base, index);
+        self.emit(Expression::Load { pointer })
+    }
+
+    /// The values that the shader's function is called with: the arguments, with what is made of the position.
+    fn arguments(
+        &mut self,
+        of_position: impl Fn(&mut Self, Handle<Expression>) -> Handle<Expression>,
+    ) -> Vec<Handle<Expression>> {
+        let arguments = self.function.arguments.clone();
+        let mut values = Vec::new();
+        for (index, FunctionArgument { ty, binding, .. }) in (0..).zip(arguments) {
+            let value = self.emit(Expression::FunctionArgument(index));
+            let value = match self.module.types[ty].inner.clone() {
+                TypeInner::Struct { members, .. }
+                    if members.iter().any(|m| is_position(m.binding.as_ref())) =>
+                {
+                    let mut components = Vec::new();
+                    for (index, member) in (0..).zip(&members) {
+                        let value = self.at(value, index);
+                        components.push(match is_position(member.binding.as_ref()) {
+                            true => {
+                                self.position = Some(value);
+                                of_position(self, value)
+                            }
+                            false => value,
+                        });
+                    }
+                    self.emit(Expression::Compose { ty, components })
+                }
+                _ if is_position(binding.as_ref()) => {
+                    self.position = Some(value);
+                    of_position(self, value)
+                }
+                _ => value,
+            };
+            values.push(value);
+        }
+        values
+    }
+
+    /// Calls the shader's function.
+    fn call(
+        &mut self,
+        arguments: Vec<Handle<Expression>>,
+    ) -> (Option<FunctionResult>, Option<Handle<Expression>>) {
+        let result = self.inner_result.clone();
+        let value = result
+            .is_some()
+            .then(|| self.emit(Expression::CallResult(self.inner)));
+        self.push(Statement::Call {
+            function: self.inner,
+            arguments,
+            result: value,
+        });
+        (result, value)
+    }
+
+    /// A clip position, moved.
+    fn moved(&mut self, position: Handle<Expression>) -> Handle<Expression> {
+        let place = self.place(0);
+        let w = self.at(position, 3);
+        let mut components: Vec<_> = (0..4).map(|i| self.at(position, i)).collect();
+        for (i, component) in (0..2).zip(&mut components) {
+            let shift = self.at(place, i);
+            let shift = self.binary(BinaryOperator::Multiply, shift, w);
+            *component = self.binary(BinaryOperator::Add, *component, shift);
+        }
+        let ty = self.ty(four(Scalar::F32));
+        self.emit(Expression::Compose { ty, components })
+    }
+
+    /// A position in fine pixels, in pixels.
+    fn in_pixels(&mut self, position: Handle<Expression>) -> Handle<Expression> {
+        let place = self.place(1);
+        let scale = self.at(place, 0);
+        let mut components: Vec<_> = (0..4).map(|i| self.at(position, i)).collect();
+        for (i, component) in (0..2).zip(&mut components) {
+            let offset = self.at(place, 1 + i);
+            let scaled = self.binary(BinaryOperator::Multiply, *component, scale);
+            *component = self.binary(BinaryOperator::Add, scaled, offset);
+        }
+        let ty = self.ty(four(Scalar::F32));
+        self.emit(Expression::Compose { ty, components })
+    }
+
+    /// Draws nothing where a texture of coverage is 0.
+    fn only_where(&mut self, (group, binding): (u32, u32)) {
+        let image = self.ty(TypeInner::Image {
+            dim: ImageDimension::D2,
+            arrayed: false,
+            class: ImageClass::Sampled {
+                kind: ScalarKind::Uint,
+                multi: false,
+            },
+        });
+        let image = self.module.global_variables.append(
+            GlobalVariable {
+                name: Some("drawn_before".to_owned()),
+                space: AddressSpace::Handle,
+                binding: Some(ResourceBinding { group, binding }),
+                ty: image,
+                init: None,
+                memory_decorations: naga::MemoryDecorations::empty(),
+            },
+            Span::UNDEFINED,
+        );
+        let position = match self.position {
+            Some(position) => position,
+            None => {
+                let ty = self.ty(four(Scalar::F32));
+                let index = self.function.arguments.len() as u32;
+                self.function.arguments.push(FunctionArgument {
+                    name: Some("fine_position".to_owned()),
+                    ty,
+                    binding: Some(Binding::BuiltIn(BuiltIn::Position { invariant: false })),
+                });
+                self.emit(Expression::FunctionArgument(index))
+            }
+        };
+        let at = self.emit(Expression::Swizzle {
+            size: VectorSize::Bi,
+            vector: position,
+            pattern: SwizzleComponent::XYZW,
+        });
+        let coordinate = self.emit(Expression::As {
+            expr: at,
+            kind: ScalarKind::Sint,
+            convert: Some(4),
+        });
+        let image = self.emit(Expression::GlobalVariable(image));
+        let level = self.emit(Expression::Literal(Literal::I32(0)));
+        let texel = self.emit(Expression::ImageLoad {
+            image,
+            coordinate,
+            array_index: None,
+            sample: None,
+            level: Some(level),
+        });
+        let drawn = self.at(texel, 0);
+        let zero = self.emit(Expression::Literal(Literal::U32(0)));
+        let condition = self.binary(BinaryOperator::Equal, drawn, zero);
+        self.push(Statement::If {
+            condition,
+            accept: Block::from_vec(vec![Statement::Kill]),
+            reject: Block::new(),
+        });
+    }
+
+    /// What the shader's function returned, one by one.
+    fn returned(
+        &mut self,
+        result: Option<FunctionResult>,
+        returned: Option<Handle<Expression>>,
+    ) -> Vec<(Binding, Handle<Type>, Handle<Expression>)> {
+        let Some((result, value)) = result.zip(returned) else {
+            return Vec::new();
+        };
+        match (&self.module.types[result.ty].inner, result.binding) {
+            (_, Some(binding)) => vec![(binding, result.ty, value)],
+            (TypeInner::Struct { members, .. }, None) => {
+                let members = members.clone();
+                let all = (0..).zip(members);
+                let bound = all.filter_map(|(i, m)| Some((i, m.binding?, m.ty)));
+                let bound: Vec<(u32, Binding, Handle<Type>)> = bound.collect();
+                let values = bound.into_iter();
+                values
+                    .map(|(i, binding, ty)| (binding, ty, self.at(value, i)))
+                    .collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// A colour of four components out of what was returned.
+    fn colour(
+        &mut self,
+        returned: Option<(Handle<Type>, Handle<Expression>)>,
+        kind: ScalarKind,
+    ) -> Handle<Expression> {
+        let mut components = Vec::new();
+        if let Some((ty, value)) = returned {
+            let (count, scalar) = match self.module.types[ty].inner {
+                TypeInner::Vector { size, scalar } => (Some(size as u32), scalar),
+                TypeInner::Scalar(scalar) => (None, scalar),
+                _ => (Some(0), Scalar::F32),
+            };
+            let value = match (scalar.kind, scalar.width) == (kind, 4) {
+                true => value,
+                false => self.emit(Expression::As {
+                    expr: value,
+                    kind,
+                    convert: Some(4),
+                }),
+            };
+            match count {
+                Some(count) => components.extend((0..count).map(|i| self.at(value, i))),
+                None => components.push(value),
+            }
+        }
+        for i in components.len()..4 {
+            let number = i32::from(i == 3);
+            components.push(self.emit(Expression::Literal(match kind {
+                ScalarKind::Sint => Literal::I32(number),
+                ScalarKind::Uint => Literal::U32(number.unsigned_abs()),
+                _ => Literal::F32(number as f32),
+            })));
+        }
+        let ty = self.ty(four(scalar(kind)));
+        self.emit(Expression::Compose { ty, components })
+    }
+
+    fn finish(
+        mut self,
+        result: Option<FunctionResult>,
+        value: Option<Handle<Expression>>,
+    ) -> Module {
+        self.function.result = result;
+        self.push(Statement::Return { value });
+        self.entry.name = NAME.to_owned();
+        self.entry.function = self.function;
+        self.module.entry_points.push(self.entry);
+        self.module
+    }
+}
+
+fn insert(module: &mut Module, inner: TypeInner) -> Handle<Type> {
+    module
+        .types
+        .insert(Type { name: None, inner }, Span::UNDEFINED)
+}

@@ -1,0 +1,22 @@
+//! The GPU renderer: draws the same scenes as the evaluator, with wgpu.
+//!
+//! ```text
+//! adapter name --adapter--> Gpu
+//! Module x Module --entry, render--> Pipeline       compiled once for a shader
+//! Pipeline x Frame --resources, render--> Drawn     colour and coverage, in textures on the device
+//! Drawn --read--> Picture                           as the evaluator gives it
+//! ```
+//!
+//! It is the only folder that names wgpu, and it does not know the search. What goes wrong on a device is a
+//! [`Diagnostic`](crate::Diagnostic); a driver that hangs or crashes takes the process with it, which is why
+//! `worker` runs all of this in a child.
+
+mod adapter;
+mod entry;
+mod read;
+mod render;
+mod resources;
+mod vertices;
+
+pub use adapter::{AdapterLabel, Gpu, list};
+pub use render::{Drawn, Pipeline, Renderer, Stages};
