@@ -4,10 +4,14 @@
 //! [`crate::emit::write_atomically`].
 
 #[cfg(feature = "search")]
+mod compare;
+#[cfg(feature = "search")]
 mod init;
 #[cfg(feature = "search")]
 mod search;
 
+#[cfg(feature = "search")]
+pub use compare::{CompareRequest, Compared, compare};
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
 #[cfg(feature = "search")]

@@ -2,7 +2,7 @@
 
 mod progress;
 
-use crate::compile::{self, InitRequest, Request};
+use crate::compile::{self, CompareRequest, InitRequest, Request};
 use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
@@ -33,6 +33,8 @@ struct Cli {
 enum Command {
     /// Lists every place that could be simplified, with its work and its candidates
     Inspect(InputArgs),
+    /// Measures the error of one shader against another, over a scene
+    Compare(CompareArgs),
     /// Writes the scene file, with everything that is inferred and why
     Init(InitArgs),
 }
@@ -50,6 +52,34 @@ struct InitArgs {
     /// Writes over a scene that is there already
     #[arg(long)]
     force: bool,
+}
+
+#[derive(Debug, Args)]
+struct CompareArgs {
+    #[command(flatten)]
+    input: InputArgs,
+    /// The shader whose error it is; the one before it is the original
+    #[arg(required = true)]
+    other: Option<PathBuf>,
+    /// A distance to compare at, from the eye to the object's centre; as often as wanted [default: those of the scene]
+    #[arg(long, value_name = "DISTANCE")]
+    at: Vec<f64>,
+    /// The level of detail that the second shader is drawn with, if it has an autoLOD; without --at, where it is reached
+    /// [default: that of each distance]
+    #[arg(long, value_name = "VALUE")]
+    autolod: Option<f64>,
+    /// How errors are held against the bound [default: the scene's, else excess]
+    #[arg(long, value_name = "excess|paper", value_parser = reading)]
+    bound: Option<BoundReading>,
+    /// Ends with exit code 1 when the second shader is over the scene's bound at one of the distances
+    #[arg(long)]
+    check: bool,
+    /// A folder for pictures of every view: of both shaders, and of what differs
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Prints the comparison as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 /// What the commands read that look at a shader in its scene.
@@ -122,6 +152,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match cli.command {
         Some(Command::Inspect(input)) => inspect(input),
         Some(Command::Init(arguments)) => init(arguments),
+        Some(Command::Compare(arguments)) => match compare(arguments) {
+            Ok(Some(failed)) => {
+                print_diagnostic(&failed);
+                return ExitCode::from(1);
+            }
+            Ok(None) => Ok(()),
+            Err(error) => Err(error),
+        },
         None => compile_command(cli.compile),
     };
     match done {
@@ -214,16 +252,53 @@ fn init(arguments: InitArgs) -> Result<()> {
     Ok(())
 }
 
+/// The command that runs, for reports.
+fn command_line() -> String {
+    std::iter::once("lodc".to_owned())
+        .chain(std::env::args().skip(1))
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// Compares two shaders; what is wrong with the second, when that is asked for.
+fn compare(arguments: CompareArgs) -> Result<Option<Box<Diagnostic>>> {
+    let request = CompareRequest {
+        original: Request {
+            bound: arguments.bound,
+            command: command_line(),
+            ..arguments.input.request()?
+        },
+        // The parser has asked for it.
+        other: arguments.other.unwrap_or_default(),
+        at: arguments.at,
+        autolod: arguments.autolod,
+        images: arguments.output,
+    };
+    let compared = compile::compare(&request)?;
+    for warning in &compared.warnings {
+        print_diagnostic(warning);
+    }
+    emit::write_atomically(&compared.files)?;
+    let comparison = &compared.comparison;
+    if arguments.json {
+        print(&comparison.json());
+    } else {
+        print(&comparison.table());
+        if let Some(folder) = &request.images {
+            let (count, folder) = (compared.files.len(), folder.display());
+            print(&format!("  {:<16}{count} pictures to {folder}\n", "wrote"));
+        }
+    }
+    Ok(arguments.check.then(|| comparison.failed()).flatten())
+}
+
 fn compile_command(arguments: CompileArgs) -> Result<()> {
     let mut request = arguments.input.request()?;
     request.output = arguments.output;
     request.bound = arguments.bound;
     request.form = arguments.form;
     request.target = arguments.target;
-    request.command = std::iter::once("lodc".to_owned())
-        .chain(std::env::args().skip(1))
-        .collect::<Vec<_>>()
-        .join(" ");
+    request.command = command_line();
     let quiet = arguments.quiet;
     if arguments.locked {
         let (files, warnings) = compile::locked(&request)?;

@@ -4,7 +4,7 @@ use super::{Files, Request, normal_form, relative};
 use crate::emit::{self, EmitLevel, Lock, Output, figure};
 use crate::eval::draw::shade;
 use crate::eval::machine::MAX_ROUNDS;
-use crate::eval::program::Program;
+use crate::eval::program::{Program, Refused};
 use crate::eval::raster::rasterize;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
@@ -31,63 +31,120 @@ pub struct Compiled {
 const TRIED: usize = 64;
 
 /// Everything that a search stands on.
-struct Ready {
+pub(super) struct Ready {
     /// The request, with what the scene says of how the shader is read.
-    request: Request,
-    source: Source,
-    scene: Scene,
+    pub(super) request: Request,
+    pub(super) source: Source,
+    pub(super) scene: Scene,
     /// The scene file, when there is one.
-    scene_file: Option<PathBuf>,
-    base: Shader,
+    pub(super) scene_file: Option<PathBuf>,
+    pub(super) base: Shader,
 }
 
-impl Ready {
-    fn read(request: &Request) -> Result<Self> {
+/// A shader that has been read, before the scene is held against it.
+pub(super) struct Read {
+    /// The request, with what the scene says of how the shader is read.
+    pub(super) request: Request,
+    pub(super) source: Source,
+    /// The scene file, when there is one.
+    pub(super) scene_file: Option<PathBuf>,
+    pub(super) base: Shader,
+}
+
+impl Read {
+    /// Reads the shader with its scene, or the scene beside it.
+    pub(super) fn new(request: &Request) -> Result<Self> {
         let beside = request.shader.with_extension("toml");
-        let scene_file = request
-            .scene
-            .clone()
-            .or_else(|| beside.is_file().then_some(beside));
-        let mut request = request.clone();
-        // A shader that is not there is the better message.
-        if let Some(file) = scene_file.as_deref().filter(|_| request.shader.exists()) {
-            let reading = Reading::read(file)?;
-            let stages = &mut request.stages;
-            stages.vertex_file = stages.vertex_file.take().or(reading.vertex_file);
-            let mut modules = reading.modules;
-            modules.folders.append(&mut request.modules.folders);
-            modules.definitions.append(&mut request.modules.definitions);
-            request.modules = modules;
+        let scene = request.scene.clone();
+        let scene = scene.or_else(|| beside.is_file().then_some(beside));
+        Self::of(as_scene_says(request, scene.as_deref())?, scene)
+    }
+
+    /// Reads a shader as the scene file of another one says. A vertex file is for shaders that have no vertex stage: what
+    /// was emitted from several files has its own.
+    pub(super) fn beside(request: &Request, scene_file: Option<PathBuf>) -> Result<Self> {
+        let request = as_scene_says(request, scene_file.as_deref())?;
+        let mut alone = request.clone();
+        if alone.stages.vertex_file.take().is_some() {
+            alone.stages.vertex = None;
+            let read = Self::of(alone, scene_file.clone())?;
+            if read.source.vertex.is_some() {
+                return Ok(read);
+            }
         }
+        Self::of(request, scene_file)
+    }
+
+    fn of(request: Request, scene_file: Option<PathBuf>) -> Result<Self> {
         let source = Source::read_with(&request.shader, &request.stages, &request.modules)?;
         // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
         let fragment = base.index(Stage::Fragment).unwrap_or(0);
         Program::compile(base.module(), fragment, &[]).map_err(|refused| refused.at(&source))?;
-        let mut scene = Scene::read(&source, scene_file.as_deref())?;
-        scene.reading = request.bound.unwrap_or(scene.reading);
         Ok(Self {
             request,
             source,
-            scene,
             scene_file,
             base,
         })
     }
 
+    /// With the scene as it is for this shader.
+    pub(super) fn ready(self, mut scene: Scene) -> Ready {
+        scene.reading = self.request.bound.unwrap_or(scene.reading);
+        Ready {
+            request: self.request,
+            source: self.source,
+            scene,
+            scene_file: self.scene_file,
+            base: self.base,
+        }
+    }
+}
+
+/// A request, with what the scene file says of how its shader is read.
+fn as_scene_says(request: &Request, scene_file: Option<&Path>) -> Result<Request> {
+    let mut request = request.clone();
+    // A shader that is not there is the better message.
+    if let Some(file) = scene_file.filter(|_| request.shader.exists()) {
+        let reading = Reading::read(file)?;
+        let stages = &mut request.stages;
+        stages.vertex_file = stages.vertex_file.take().or(reading.vertex_file);
+        let mut modules = reading.modules;
+        modules.folders.append(&mut request.modules.folders);
+        modules.definitions.append(&mut request.modules.definitions);
+        request.modules = modules;
+    }
+    Ok(request)
+}
+
+impl Ready {
+    fn read(request: &Request) -> Result<Self> {
+        let read = Read::new(request)?;
+        let scene = Scene::read(&read.source, read.scene_file.as_deref())?;
+        Ok(read.ready(scene))
+    }
+
     /// The vertex program: of the source, or the one that lodc supplies.
-    fn vertex(&self) -> Result<Program> {
-        let compiled = match (&self.scene.vertex_stage, self.base.index(Stage::Vertex)) {
-            (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
-            (None, index) => Program::compile(self.base.module(), index.unwrap_or(0), &[]),
-        };
-        compiled.map_err(|refused| refused.at(&self.source))
+    pub(super) fn vertex(&self) -> Result<Program> {
+        vertex_program(&self.scene, &self.base).map_err(|refused| refused.at(&self.source))
+    }
+}
+
+/// The vertex program of a shader in its scene: its own, or the one that lodc supplies.
+pub(super) fn vertex_program(
+    scene: &Scene,
+    base: &Shader,
+) -> std::result::Result<Program, Refused> {
+    match (&scene.vertex_stage, base.index(Stage::Vertex)) {
+        (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
+        (None, index) => Program::compile(base.module(), index.unwrap_or(0), &[]),
     }
 }
 
 impl Ready {
     /// Draws some of the first frame, since a loop that does not end would be run for every pixel of all frames.
-    fn ends(&self, vertex: &Program) -> Result<()> {
+    pub(super) fn ends(&self, vertex: &Program) -> Result<()> {
         let fragment = self.base.index(Stage::Fragment).unwrap_or(0);
         let fragment = Program::compile(self.base.module(), fragment, &[])
             .map_err(|refused| refused.at(&self.source))?;
@@ -188,7 +245,7 @@ impl Ready {
     }
 
     /// Every file that was read.
-    fn inputs<'a>(&'a self, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
+    pub(super) fn inputs<'a>(&'a self, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
         let textures = self
             .scene
             .textures
@@ -230,15 +287,7 @@ impl Ready {
             seed: self.scene.seed,
             pixels_per_degree: self.scene.pixels_per_degree,
             bound: self.scene.reading.name(),
-            inputs: self
-                .scene
-                .inputs
-                .iter()
-                .map(|input| Input {
-                    file: input.name.clone(),
-                    hash: input.hash.clone(),
-                })
-                .collect(),
+            inputs: self.read_files(),
             triangles: self.scene.mesh.indices.len() / 3,
             vertex: vertex
                 .and_then(|function| cost::of_function(self.base.module(), function).ok())
@@ -249,13 +298,27 @@ impl Ready {
                 .iter()
                 .map(|w| w.message.clone())
                 .collect(),
-            inferences: self
-                .scene
-                .inferences
-                .iter()
-                .map(|inference| format!("{} = {}", inference.what, inference.as_))
-                .collect(),
+            inferences: self.inferred(),
         }
+    }
+
+    /// What was read, for a report.
+    pub(super) fn read_files(&self) -> Vec<Input> {
+        let inputs = self.scene.inputs.iter();
+        inputs
+            .map(|input| Input {
+                file: input.name.clone(),
+                hash: input.hash.clone(),
+            })
+            .collect()
+    }
+
+    /// What was inferred, for a report.
+    pub(super) fn inferred(&self) -> Vec<String> {
+        let inferences = self.scene.inferences.iter();
+        inferences
+            .map(|inference| format!("{} = {}", inference.what, inference.as_))
+            .collect()
     }
 
     fn lock(&self, request: &Request, found: &Found, levels: &[EmitLevel]) -> Lock {

@@ -3,12 +3,14 @@
 //! [`Report`] is the one source of both. What is not known is null, never left out, so that a program that
 //! reads it need not ask which version wrote it.
 
+mod comparison;
 mod terminal;
 
+pub use comparison::{ComparedAt, Comparison};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::front::{Place, Source};
-use crate::search::{AtDistance, Found, Level};
+use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
 use lodc_passes::{Class, PASSES, Shader, Work};
 use serde::Serialize;
 
@@ -253,6 +255,28 @@ impl Report {
     }
 }
 
+impl ErrorReport {
+    fn new(error: &ErrorFigures, flip: f64, held_out: Option<&HeldOut>) -> Self {
+        Self {
+            rmse: error.rmse,
+            floor: error.floor,
+            excess: error.excess(),
+            bound: error.bound,
+            max: error.max,
+            psnr: Some(error.psnr()).filter(|psnr| psnr.is_finite()),
+            flip,
+            held_out_rmse: held_out.map(|held_out| held_out.rmse),
+            held_out_standard_error: held_out.and_then(|held_out| held_out.standard_error),
+            held_out_excess: held_out.map(|held_out| held_out.excess),
+            worst_view: error.worst_view,
+            worst_tile: error.worst_tile,
+            shimmer: error.shimmer,
+            shimmer_floor: error.shimmer_floor,
+            transition: None,
+        }
+    }
+}
+
 fn level_report(
     level: &Level,
     says: String,
@@ -260,30 +284,13 @@ fn level_report(
     source: &Source,
     origin: &Origin,
 ) -> LevelReport {
-    let error = &level.error;
     let steps = level.recipe.0.iter().enumerate();
     let place = |site| base.find(site).and_then(|at| place_of(base, source, at));
     LevelReport {
         autolod: level.autolod,
         distance: level.distance,
         says,
-        error: ErrorReport {
-            rmse: error.rmse,
-            floor: error.floor,
-            excess: error.excess(),
-            bound: error.bound,
-            max: error.max,
-            psnr: Some(error.psnr()).filter(|psnr| psnr.is_finite()),
-            flip: level.flip,
-            held_out_rmse: level.held_out.map(|held_out| held_out.rmse),
-            held_out_standard_error: level.held_out.and_then(|held_out| held_out.standard_error),
-            held_out_excess: level.held_out.map(|held_out| held_out.excess),
-            worst_view: error.worst_view,
-            worst_tile: error.worst_tile,
-            shimmer: error.shimmer,
-            shimmer_floor: error.shimmer_floor,
-            transition: None,
-        },
+        error: ErrorReport::new(&level.error, level.flip, level.held_out.as_ref()),
         time: TimeReport {
             kind: "estimated",
             ms: None,

@@ -220,7 +220,7 @@ fn short(choice: &str) -> &str {
 }
 
 /// Rows as aligned columns, two spaces in front; `left` says which are aligned to the left.
-fn columns<const N: usize>(rows: &[[String; N]], left: &[bool; N]) -> String {
+pub(super) fn columns<const N: usize>(rows: &[[String; N]], left: &[bool; N]) -> String {
     let mut widths = [0; N];
     for row in rows {
         for (width, cell) in widths.iter_mut().zip(row) {

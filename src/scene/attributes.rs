@@ -17,6 +17,27 @@ pub(super) struct Fed {
     pub(super) stage: Option<VertexStage>,
 }
 
+/// The inputs of a shader that something feeds, by their locations: of its vertex stage, or of its fragment stage where
+/// it has no other.
+fn fed_inputs(source: &Source) -> (Vec<(u32, Input)>, ShaderStage) {
+    let (entry, stage) = match source.vertex_entry() {
+        Some((entry, _)) => (entry, ShaderStage::Vertex),
+        None => (source.fragment_entry().0, ShaderStage::Fragment),
+    };
+    let inputs = inputs(source, entry).into_iter();
+    let located = inputs.filter_map(|input| match input.binding {
+        Binding::Location { location, .. } => Some((location, input)),
+        Binding::BuiltIn(_) => None,
+    });
+    (located.collect(), stage)
+}
+
+/// Whether a shader has an input of this name that something feeds.
+pub(super) fn has(source: &Source, name: &str) -> bool {
+    let (inputs, _) = fed_inputs(source);
+    inputs.iter().any(|(_, input)| input.name == name)
+}
+
 /// Reads `[attributes]` and guesses the rest.
 pub(super) fn resolve(
     source: &Source,
@@ -25,17 +46,7 @@ pub(super) fn resolve(
     settings: &Settings,
     inferences: &mut Vec<Inference>,
 ) -> Result<Fed> {
-    let (entry, stage) = match source.vertex_entry() {
-        Some((entry, _)) => (entry, ShaderStage::Vertex),
-        None => (source.fragment_entry().0, ShaderStage::Fragment),
-    };
-    let inputs: Vec<(u32, Input)> = inputs(source, entry)
-        .into_iter()
-        .filter_map(|input| match input.binding {
-            Binding::Location { location, .. } => Some((location, input)),
-            Binding::BuiltIn(_) => None,
-        })
-        .collect();
+    let (inputs, stage) = fed_inputs(source);
     let mut given = BTreeMap::new();
     for (key, value) in &entries.0 {
         let found = inputs.iter().find(|(_, i)| i.name == *key.get_ref());
@@ -145,14 +156,10 @@ fn later_sets<'i>(
 
 /// The inputs that nothing feeds, with a line for each that could: their names, the line and the type.
 pub(super) fn unfed(source: &Source) -> Vec<(String, String, String)> {
-    let (entry, stage) = match source.vertex_entry() {
-        Some((entry, _)) => (entry, ShaderStage::Vertex),
-        None => (source.fragment_entry().0, ShaderStage::Fragment),
-    };
-    let inputs = inputs(source, entry).into_iter().filter_map(|input| {
+    let (inputs, stage) = fed_inputs(source);
+    let inputs = inputs.into_iter().filter_map(|(_, input)| {
         let ty = &source.module.types[input.ty].inner;
-        let located = matches!(input.binding, Binding::Location { .. });
-        if !located || Feed::infer(&input.name, ty, stage).is_some() {
+        if Feed::infer(&input.name, ty, stage).is_some() {
             return None;
         }
         let value = Feed::suggestion(ty, stage);

@@ -47,7 +47,7 @@ pub fn initial(
         let _ = writeln!(fed, "{line}");
     }
     let attempt = |text: &str| {
-        Scene::attempt(source, Some((path, text))).map_err(|error| unplaced(error, path))
+        Scene::attempt(source, Some((path, text)), None).map_err(|error| unplaced(error, path))
     };
     // What is missing gets some value for a while: the rest is known then.
     let (scene, missing) = match attempt(&(head.clone() + &fed))? {

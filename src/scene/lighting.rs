@@ -109,6 +109,13 @@ struct Output {
     span: Span,
 }
 
+/// Whether a shader returns something at a location.
+pub(super) fn returns(source: &Source, location: &str) -> bool {
+    let location = location.parse().ok();
+    let mut outputs = outputs(source).into_iter();
+    outputs.any(|output| Some(output.location) == location)
+}
+
 /// What the fragment entry point returns at locations, in order.
 fn outputs(source: &Source) -> Vec<Output> {
     let types = &source.module.types;

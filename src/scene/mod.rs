@@ -8,6 +8,7 @@
 //! What nothing tells is an error that names the lines to add.
 
 mod attributes;
+mod both;
 mod buffers;
 pub mod camera;
 pub(crate) mod chance;
@@ -209,7 +210,16 @@ impl Scene {
     /// When the text is no scene, does not fit the shader, or names images that cannot be read; and when
     /// something is neither given nor to be inferred, naming all such things and the lines to add.
     pub fn resolve(source: &Source, file: Option<(&Path, &str)>) -> Result<Self> {
-        Self::attempt(source, file)?.map_err(|missing| {
+        Self::resolve_beside(source, file, None)
+    }
+
+    /// As [`Scene::resolve`]; what the file says of `other` alone is passed over.
+    fn resolve_beside(
+        source: &Source,
+        file: Option<(&Path, &str)>,
+        other: Option<&Source>,
+    ) -> Result<Self> {
+        Self::attempt(source, file, other)?.map_err(|missing| {
             let name = Self::file_name(source, file);
             let place = match file {
                 Some(_) => format!("`{name}`"),
@@ -234,11 +244,15 @@ impl Scene {
     fn attempt(
         source: &Source,
         file: Option<(&Path, &str)>,
+        other: Option<&Source>,
     ) -> Result<std::result::Result<Self, Vec<Missing>>> {
         let name = Self::file_name(source, file);
         let text = file.map_or("", |(_, text)| text);
         let toml = Toml { name: &name, text };
-        let file_values = toml.parse()?;
+        let mut file_values = toml.parse()?;
+        if let Some(other) = other {
+            both::pass_over(&mut file_values, source, other);
+        }
         let folder = match file {
             Some((path, _)) => path.parent(),
             None => source.path.as_deref().and_then(Path::parent),
@@ -433,6 +447,20 @@ impl Scene {
                 frame
             })
             .collect()
+    }
+
+    /// The picture of the same view, of the same values of the uniforms, in this scene.
+    pub(crate) fn again(&self, frame: &Frame) -> Frame {
+        let Shot {
+            direction,
+            distance,
+            draw,
+        } = frame.shot;
+        Frame {
+            offset: frame.offset,
+            grid: frame.grid,
+            ..self.frame(direction, distance, draw)
+        }
     }
 
     fn frame(&self, direction: DVec3, distance: f64, draw: Draw) -> Frame {

@@ -1,13 +1,14 @@
-//! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it.
+//! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it; and a frame as a
+//! picture, for people.
 
 use super::error::{FrameError, Reference, TILE, Tally, displayed, encoded};
-use super::samples::Stand;
 use crate::eval::draw::{Lit, Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
-use crate::scene::{Output, chance::mix};
+use crate::scene::{Output, Scene, chance::mix};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Fine pixels of the reference to a pixel, along each axis.
 const GRID: u32 = 4;
@@ -21,6 +22,14 @@ pub(super) enum Part {
     Tiles(usize),
 }
 
+/// What draws a frame: the stages of a shader, and the scene as it is for that shader.
+#[derive(Clone, Copy)]
+pub(super) struct Pen<'a> {
+    pub(super) vertex: &'a Program,
+    pub(super) fragment: &'a Program,
+    pub(super) scene: &'a Scene,
+}
+
 /// A frame, rasterised.
 pub(super) struct Rasterised {
     /// Which of the scene's views it is, from 0.
@@ -29,7 +38,7 @@ pub(super) struct Rasterised {
     /// One for each offset.
     pub(super) drawings: Vec<Drawing>,
     /// The pixels that the reference or a fragment covers.
-    reference: Reference,
+    reference: Arc<Reference>,
 }
 
 /// A frame rasterised at one offset.
@@ -44,63 +53,82 @@ pub(super) struct Drawing {
 }
 
 impl Rasterised {
-    /// Rasterises a frame at each offset, and draws its reference: the original, 4 x 4 samples a pixel. Of more pixels
-    /// than the part allows some are chosen, by the seed.
+    /// Rasterises a frame at each offset, for each shader that draws it, and draws its reference: the first, the
+    /// original, 4 x 4 samples a pixel. Of more pixels than the part allows some are chosen, by the seed. One for each
+    /// shader comes back, with the frame as its scene binds it; all have the same reference.
     pub(super) fn new(
-        stand: &Stand<'_>,
-        original: &Program,
-        (view, frame): (usize, Frame),
+        pens: &[(Pen<'_>, Frame)],
+        view: usize,
         offsets: &[[f32; 2]],
         (part, seed): (Part, u64),
-    ) -> Self {
-        let at = |offset: [f32; 2], grid: u32| Frame {
+    ) -> Vec<Self> {
+        let at = |frame: &Frame, offset: [f32; 2], grid: u32| Frame {
             offset,
             grid,
             ..frame.clone()
         };
-        let mut coverages: Vec<Coverage> = offsets
+        let Some((original, frame)) = pens.first() else {
+            return Vec::new();
+        };
+        let mut coverages: Vec<Vec<Coverage>> = pens
             .iter()
-            .map(|offset| rasterize(stand.vertex, original, &at(*offset, 1)))
+            .map(|(pen, frame)| {
+                let offsets = offsets.iter();
+                let frames = offsets.map(|offset| at(frame, *offset, 1));
+                frames
+                    .map(|frame| rasterize(pen.vertex, pen.fragment, &frame))
+                    .collect()
+            })
             .collect();
-        let fine = at([0.0; 2], GRID);
-        let mut reference = rasterize(stand.vertex, original, &fine);
-        let mut squares: Vec<_> = coverages.iter().flat_map(Coverage::squares).collect();
-        squares.extend(reference.squares());
+        let fine = at(frame, [0.0; 2], GRID);
+        let mut reference = rasterize(original.vertex, original.fragment, &fine);
+        let all = coverages.iter().flatten().chain([&reference]);
         // A square is 2 x 2 pixels.
         let (side, most) = match part {
             Part::Squares(most) => (1, most),
             Part::Tiles(most) => (TILE / 2, most),
         };
         let place = |(x, y): (u32, u32)| (x / side, y / side);
-        let mut places: Vec<_> = squares.into_iter().map(place).collect();
+        let mut places: Vec<_> = all.flat_map(Coverage::squares).map(place).collect();
         places.sort_unstable();
         places.dedup();
         if places.len() > most {
             let kept = choose(&places, most.max(1), seed);
             let part = |coverage: &Coverage| coverage.part(|square| kept.contains(&place(square)));
-            coverages = coverages.iter().map(part).collect();
+            for coverage in coverages.iter_mut().flatten() {
+                *coverage = part(coverage);
+            }
             reference = part(&reference);
         }
-        let output = stand.scene.output;
+        let output = original.scene.output;
         let mut shading = Shading::default();
-        let lit = stand.scene.lit(&fine, &reference);
-        let bindings = fine.bindings;
-        shade(lit.as_ref(), original, &reference, &bindings, &mut shading);
-        let (reference, pixels) = reference_of(&reference, &shading, &coverages, output);
-        let drawings = coverages
-            .into_iter()
-            .zip(offsets)
-            .map(|(coverage, offset)| {
-                let lit = stand.scene.lit(&at(*offset, 1), &coverage);
-                Drawing::new(original, coverage, lit, &pixels, &bindings)
+        let lit = original.scene.lit(&fine, &reference);
+        shade(
+            lit.as_ref(),
+            original.fragment,
+            &reference,
+            &fine.bindings,
+            &mut shading,
+        );
+        let (reference, pixels) =
+            reference_of(&reference, &shading, coverages.iter().flatten(), output);
+        let reference = Arc::new(reference);
+        let drawn = pens.iter().zip(coverages);
+        drawn
+            .map(|((pen, frame), coverages)| {
+                let drawings = coverages.into_iter().zip(offsets);
+                let drawings = drawings.map(|(coverage, offset)| {
+                    let lit = pen.scene.lit(&at(frame, *offset, 1), &coverage);
+                    Drawing::new(pen.fragment, coverage, lit, &pixels, &frame.bindings)
+                });
+                Self {
+                    view,
+                    drawings: drawings.collect(),
+                    bindings: frame.bindings.clone(),
+                    reference: Arc::clone(&reference),
+                }
             })
-            .collect();
-        Self {
-            view,
-            bindings,
-            drawings,
-            reference,
-        }
+            .collect()
     }
 
     /// Which of the scene's views it is.
@@ -173,11 +201,33 @@ fn shade(
     }
 }
 
+/// A frame as a display shows it over black, row by row: encoded colours, 0..1. One sample a pixel, at its centre.
+pub(super) fn shown(pen: &Pen<'_>, frame: &Frame) -> Vec<[f32; 3]> {
+    let coverage = rasterize(pen.vertex, pen.fragment, frame);
+    let lit = pen.scene.lit(frame, &coverage);
+    let mut shading = Shading::default();
+    shade(
+        lit.as_ref(),
+        pen.fragment,
+        &coverage,
+        &frame.bindings,
+        &mut shading,
+    );
+    let picture = resolve(&coverage, &shading);
+    let pixels = picture.pixels.iter().zip(&picture.covered);
+    pixels
+        .map(|(colour, covered)| match *covered > 0.0 {
+            true => encoded(pen.scene.output, *colour),
+            false => [0.0; 3],
+        })
+        .collect()
+}
+
 /// The pixels that the reference or a fragment covers, and the place of each in the picture, `y * width + x`, sorted.
-fn reference_of(
+fn reference_of<'c>(
     fine: &Coverage,
     shading: &Shading,
-    coverages: &[Coverage],
+    coverages: impl Iterator<Item = &'c Coverage>,
     output: Output,
 ) -> (Reference, Vec<u32>) {
     let mut picture = resolve(fine, shading);
@@ -193,7 +243,7 @@ fn reference_of(
         .filter(|(_, c)| **c > 0.0)
         .map(|(i, _)| i)
         .collect();
-    pixels.extend(coverages.iter().flat_map(Coverage::pixels));
+    pixels.extend(coverages.flat_map(Coverage::pixels));
     pixels.sort_unstable();
     pixels.dedup();
     let reference = Reference::new(pixels.iter().map(|pixel| {

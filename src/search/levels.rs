@@ -187,7 +187,7 @@ pub fn find(
 
 /// The autoLOD of a distance as a threshold: rounded up to hundredths, so that it reads well and no level
 /// begins nearer than where it was confirmed.
-pub(super) fn threshold(scene: &Scene, distance: f64) -> f64 {
+pub(crate) fn threshold(scene: &Scene, distance: f64) -> f64 {
     (scene.auto_lod(distance) * 100.0).ceil() / 100.0
 }
 

@@ -24,5 +24,6 @@ pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
 pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
+pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, find};
-pub use samples::{Measured, SampleSet, Samples, Stand};
+pub use samples::{Measured, SampleSet, Samples, Shown, Stand};

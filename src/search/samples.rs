@@ -2,7 +2,7 @@
 //! the reference beside them. A variant is then one run of its fragment program.
 
 use super::error::{Details, ErrorFigures, ErrorSum};
-use super::frame::{Part, Rasterised};
+use super::frame::{Part, Pen, Rasterised, shown};
 use crate::eval::program::{Program, Refused};
 use crate::scene::{
     Scene, Split,
@@ -61,6 +61,17 @@ pub struct Measured {
     pub work: Work,
 }
 
+/// A picture as a display shows it over black, one sample a pixel, at its centre.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// sRGB-encoded colours, 0..1, row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
 /// The samples at one distance.
 pub struct SampleSet<'a> {
     pub(super) stand: &'a Stand<'a>,
@@ -75,8 +86,29 @@ impl<'a> SampleSet<'a> {
     /// # Errors
     /// When the evaluator refuses the original.
     pub fn new(stand: &'a Stand<'a>, distance: f64, samples: Samples) -> Result<Self, Refused> {
-        let original = compile(stand.base, &[])?;
-        let scene = stand.scene;
+        let [set] = Self::beside([stand], distance, samples)?;
+        Ok(set)
+    }
+
+    /// All samples of two shaders of one scene at a distance, for [`crate::scene::Scene::read_both`]. The first is the
+    /// original, and each picture is of the same view with the same uniforms. What the second set measures, of the
+    /// second shader, is against the first one's reference, floor and work.
+    ///
+    /// # Errors
+    /// When the evaluator refuses one of them.
+    pub fn of_two(stands: [&'a Stand<'a>; 2], distance: f64) -> Result<[Self; 2], Refused> {
+        Self::beside(stands, distance, Samples::Full)
+    }
+
+    /// The samples of several shaders, the original first.
+    fn beside<const N: usize>(
+        stands: [&'a Stand<'a>; N],
+        distance: f64,
+        samples: Samples,
+    ) -> Result<[Self; N], Refused> {
+        let programs = stands.iter().map(|stand| compile(stand.base, &[]));
+        let programs: Vec<Program> = programs.collect::<Result<_, _>>()?;
+        let scene = stands[0].scene;
         let frames = match samples {
             Samples::HeldOut(split) => scene.held_out(distance, split, HELD_OUT),
             Samples::Search | Samples::Full => scene.frames(distance),
@@ -87,7 +119,7 @@ impl<'a> SampleSet<'a> {
             Samples::Full => Part::Tiles(MOST_TILES / (count * scene.offsets)),
             Samples::HeldOut(_) => Part::Tiles(MOST_TILES / count),
         };
-        let frames = frames
+        let rasterised: Vec<Vec<Rasterised>> = frames
             .into_par_iter()
             .enumerate()
             .map(|(index, frame)| {
@@ -104,17 +136,34 @@ impl<'a> SampleSet<'a> {
                         (view, vec![offsets.swap_remove(index % scene.offsets)])
                     }
                 };
-                Rasterised::new(stand, &original, (view, frame), &offsets, (part, seed))
+                let pens = stands.iter().zip(&programs).map(|(stand, fragment)| {
+                    let pen = Pen {
+                        vertex: stand.vertex,
+                        fragment,
+                        scene: stand.scene,
+                    };
+                    (pen, stand.scene.again(&frame))
+                });
+                let pens: Vec<_> = pens.collect();
+                Rasterised::new(&pens, view, &offsets, (part, seed))
             })
             .collect();
-        let mut set = Self {
+        let mut sets = stands.map(|stand| Self {
             stand,
             distance,
-            frames,
+            frames: Vec::with_capacity(count),
             original: Default::default(),
-        };
-        set.original = set.details(&original);
-        Ok(set)
+        });
+        for of_all in rasterised {
+            for (set, frame) in sets.iter_mut().zip(of_all) {
+                set.frames.push(frame);
+            }
+        }
+        let original = sets[0].details(&programs[0]);
+        for set in &mut sets {
+            set.original = original.clone();
+        }
+        Ok(sets)
     }
 
     /// The distance of its frames, in world units.
@@ -171,6 +220,29 @@ impl<'a> SampleSet<'a> {
             .iter()
             .fold((0.0, 0), |(sum, count), (s, c)| (sum + s, count + c));
         Ok(sum / count.max(1) as f64)
+    }
+
+    /// A shader's pictures, one for each view, with the first sample of the uniforms, as a display shows them over black
+    /// (see [`Shown`]).
+    ///
+    /// # Errors
+    /// When the evaluator refuses it.
+    pub fn pictures(&self, shader: &Shader) -> Result<Vec<Shown>, Refused> {
+        let scene = self.stand.scene;
+        let fragment = compile(shader, &[])?;
+        let pen = Pen {
+            vertex: self.stand.vertex,
+            fragment: &fragment,
+            scene,
+        };
+        let frames = scene.frames(self.distance);
+        let first_of_view = frames.par_iter().step_by(scene.uniform_samples());
+        let pictures = first_of_view.map(|frame| Shown {
+            width: frame.width,
+            height: frame.height,
+            pixels: shown(&pen, frame),
+        });
+        Ok(pictures.collect())
     }
 
     /// Measures the original and a variant of it frame by frame: what a held-out split is judged by.

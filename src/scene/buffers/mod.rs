@@ -19,6 +19,7 @@ use naga::{AddressSpace, GlobalVariable, Handle, Module, ScalarKind};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use used::Used;
+pub(super) use value::has;
 use value::read_entry;
 
 /// How a part of a buffer varies.
@@ -191,6 +192,20 @@ impl Buffer {
             }
         }
         bytes
+    }
+
+    /// Whether a part of it is a level of detail that the shader itself declares.
+    pub(super) fn has_auto_lod(&self) -> bool {
+        self.parts.iter().any(|(leaf, _)| is_auto_lod(leaf))
+    }
+
+    /// Sets that level of detail.
+    pub(super) fn set_auto_lod(&mut self, auto_lod: f64) {
+        for (leaf, fill) in &mut self.parts {
+            if is_auto_lod(leaf) {
+                *fill = Fill::Dynamic(vec![auto_lod]);
+            }
+        }
     }
 
     /// Its parts, as the rest of the compiler sees them.

@@ -135,6 +135,12 @@ impl Meaning {
     }
 }
 
+/// Whether a key of `[uniforms]` or `[storage]` names a part of a buffer of this shader.
+pub(in crate::scene) fn has(source: &Source, table: &str, key: &Spanned<String>) -> bool {
+    let unsaid = Toml { name: "", text: "" };
+    find(source, &Layout::new(&source.module), unsaid, table, key).is_ok()
+}
+
 /// The part of a buffer that a key names.
 fn find(
     source: &Source,

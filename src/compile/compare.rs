@@ -1,0 +1,292 @@
+//! One shader held against another: the error of the second, with the first as the original.
+//!
+//! Both are drawn in one scene, each with its own stages and its own bindings, by the machinery that measures levels. A
+//! shader that was emitted is given the `autoLOD` of each distance, so that it draws the level that a host would choose.
+
+use super::search::{Read, Ready, vertex_program};
+use super::{Files, Request, normal_form};
+use crate::emit::{figure, writable};
+use crate::eval::image::{encode_png, to_byte};
+use crate::front::Source;
+use crate::report::{ComparedAt, Comparison, Input};
+use crate::scene::Scene;
+use crate::search::{SampleSet, Shown, Stand, threshold};
+use crate::{Diagnostic, Result};
+use lodc_passes::autolod;
+use naga::back::pipeline_constants::process_overrides;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// What is compared, and where from.
+#[derive(Clone, Debug, Default)]
+pub struct CompareRequest {
+    /// The original, how it is read, its scene, and how errors are held against the bound. Entry points, modules and a
+    /// vertex file go for the other shader too, as far as it has no vertex stage of its own.
+    pub original: Request,
+    /// The shader whose error it is.
+    pub other: PathBuf,
+    /// The distances; by default that of `autolod`, else those of the scene.
+    pub at: Vec<f64>,
+    /// The other shader's `autoLOD`; by default that of each distance.
+    pub autolod: Option<f64>,
+    /// The folder that pictures are written to.
+    pub images: Option<PathBuf>,
+}
+
+/// What a comparison gives.
+#[derive(Debug)]
+pub struct Compared {
+    /// The pictures, to be written.
+    pub files: Files,
+    /// What was found.
+    pub comparison: Comparison,
+    /// What should be known, located.
+    pub warnings: Vec<Box<Diagnostic>>,
+}
+
+/// How much larger differences are drawn.
+const GAIN: u8 = 4;
+
+/// The name that emitted shaders give to what they choose a level by.
+const AUTO_LOD: &str = "autoLOD";
+
+/// Compares two shaders.
+///
+/// # Errors
+/// When an input cannot be read or is wrong, at its place; when the shaders do not fit one scene; when a distance or a
+/// level of detail is none.
+pub fn compare(request: &CompareRequest) -> Result<Compared> {
+    let (a, mut b) = read(request)?;
+    let vertex = a.vertex()?;
+    a.ends(&vertex)?;
+    b.ends(&b.vertex()?)?;
+    if let Some(folder) = &request.images {
+        // What cannot be written should be known before pictures are drawn.
+        writable(&[(folder.join("a.png"), Vec::new())])?;
+    }
+    let original = Stand {
+        base: &a.base,
+        vertex: &vertex,
+        scene: &a.scene,
+    };
+    let chooses = chooses(&b);
+    let mut files = Files::new();
+    let mut distances = Vec::new();
+    for distance in distances_of(request, &a.scene)? {
+        // As thresholds are rounded, so that a level is seen where it starts.
+        let wanted = request
+            .autolod
+            .unwrap_or_else(|| threshold(&a.scene, distance));
+        b.scene.set_auto_lod(wanted);
+        let source = specialised(&b.source, wanted)?;
+        let base = normal_form(&source)?;
+        let vertex = vertex_program(&b.scene, &base).map_err(|refused| refused.at(&source))?;
+        let other = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &b.scene,
+        };
+        // The original has been compiled once; what is refused by now is the other's.
+        let measured = SampleSet::of_two([&original, &other], distance).and_then(|[a, b]| {
+            let at = (distance, chooses.then_some(wanted));
+            let (error, flip) = (b.figures(&base)?, b.flip(&base)?);
+            let pair = [&a.original(), &b.measure(&base)?];
+            let found = ComparedAt::new(at, &error, flip, pair);
+            let pictures = match &request.images {
+                Some(_) => Some([a.pictures(original.base)?, b.pictures(&base)?]),
+                None => None,
+            };
+            Ok((found, pictures))
+        });
+        let (found, pictures) = measured.map_err(|refused| refused.at(&source))?;
+        distances.push(found);
+        if let (Some(folder), Some(pictures)) = (&request.images, pictures) {
+            files.extend(sheets(folder, distance, &pictures)?);
+        }
+    }
+    let inputs: Vec<PathBuf> = a.inputs(&a.request).chain(b.inputs(&b.request)).collect();
+    request.original.spare(&files, &inputs)?;
+    let warnings = warnings(request, &a.scene, &b.scene, chooses);
+    Ok(Compared {
+        comparison: comparison(request, &a, &b, distances, &warnings),
+        files,
+        warnings,
+    })
+}
+
+/// Both shaders, each with the scene as it is for that shader.
+fn read(request: &CompareRequest) -> Result<(Ready, Ready)> {
+    let a = Read::new(&request.original)?;
+    let of_b = Request {
+        shader: request.other.clone(),
+        ..request.original.clone()
+    };
+    let b = Read::beside(&of_b, a.scene_file.clone())?;
+    let scene_file = a.scene_file.as_deref();
+    let (scene_of_a, scene_of_b) = Scene::read_both(&a.source, &b.source, scene_file)?;
+    Ok((a.ready(scene_of_a), b.ready(scene_of_b)))
+}
+
+/// Whether a shader's level is chosen by `autoLOD`.
+fn chooses(ready: &Ready) -> bool {
+    let mut settings = ready.source.module.overrides.iter();
+    settings.any(|(_, setting)| setting.name.as_deref() == Some(AUTO_LOD))
+        || ready.scene.has_auto_lod()
+}
+
+/// The distances that are looked at, nearest first.
+fn distances_of(request: &CompareRequest, scene: &Scene) -> Result<Vec<f64>> {
+    let wrong = |option: &str, value: f64, wants: &str, way: &str| {
+        Err(Diagnostic::error(format!("`{option} {value}` is {wants}")).with_note(way))
+    };
+    if let Some(value) = request
+        .autolod
+        .filter(|value| !(0.0..=MOST_HALVINGS).contains(value))
+    {
+        return wrong(
+            "--autolod",
+            value,
+            "no level of detail",
+            "it counts halvings of scale on screen since the nearest distance: 0 to 64",
+        );
+    }
+    let inside = |distance: &&f64| !(distance.is_finite() && **distance > scene.sphere.radius);
+    if let Some(&value) = request.at.iter().find(inside) {
+        let radius = figure(scene.sphere.radius);
+        let way = format!(
+            "a distance is from the eye to the centre of the object's bounding sphere, whose radius is {radius}; the scene's are {} to {}",
+            figure(scene.nearest),
+            figure(scene.farthest)
+        );
+        return wrong("--at", value, "no distance outside of the object", &way);
+    }
+    let mut distances = match (request.at.as_slice(), request.autolod) {
+        ([], Some(value)) => {
+            let view = scene.view(scene.nearest);
+            vec![autolod::distance_of(value, scene.rho0(), &view)]
+        }
+        ([], None) => scene.distances.clone(),
+        (at, _) => at.to_vec(),
+    };
+    distances.sort_by(f64::total_cmp);
+    distances.dedup();
+    Ok(distances)
+}
+
+/// The most halvings of scale that are asked for: by then nothing is left of any object.
+const MOST_HALVINGS: f64 = 64.0;
+
+/// A source with its pipeline constant `autoLOD` set, if it has one.
+fn specialised(source: &Source, autolod: f64) -> Result<Source> {
+    let mut settings = source.module.overrides.iter();
+    let found = settings.find(|(_, setting)| setting.name.as_deref() == Some(AUTO_LOD));
+    let Some((handle, setting)) = found else {
+        return Ok(source.clone());
+    };
+    // A constant with a number is known by its number alone.
+    let key = setting.id.map_or(AUTO_LOD.to_owned(), |id| id.to_string());
+    let constants = [(key, autolod)].into_iter().collect();
+    let made = process_overrides(&source.module, &source.info, None, &constants);
+    let (module, info) = made.map_err(|error| {
+        let at = source.module.overrides.get_span(handle);
+        source
+            .error(
+                format!("the pipeline constants cannot be set: {error}"),
+                at,
+                "",
+            )
+            .with_note("give each `override` a default")
+    })?;
+    Ok(Source {
+        module: module.into_owned(),
+        info: info.into_owned(),
+        ..source.clone()
+    })
+}
+
+/// The pictures of a distance as files: for each view the original's, the other's, and their difference.
+fn sheets(folder: &Path, distance: f64, [a, b]: &[Vec<Shown>; 2]) -> Result<Files> {
+    let mut files = Files::new();
+    for (view, (a, b)) in a.iter().zip(b).enumerate() {
+        let difference: Vec<[f32; 3]> = a.pixels.iter().zip(&b.pixels).map(apart).collect();
+        let three = [
+            ("a", &a.pixels),
+            ("b", &b.pixels),
+            (&*format!("difference_x{GAIN}"), &difference),
+        ];
+        for (what, pixels) in three {
+            let bytes = pixels
+                .iter()
+                .map(|[r, g, b]| [to_byte(*r), to_byte(*g), to_byte(*b), 255]);
+            let bytes: Vec<[u8; 4]> = bytes.collect();
+            let name = format!("{}_view{}_{what}.png", figure(distance), view + 1);
+            files.push((folder.join(name), encode_png(a.width, a.height, &bytes)?));
+        }
+    }
+    Ok(files)
+}
+
+/// How far apart two colours are, enlarged. A NaN is as far as can be.
+fn apart((a, b): (&[f32; 3], &[f32; 3])) -> [f32; 3] {
+    std::array::from_fn(|i| match a[i].is_nan() || b[i].is_nan() {
+        true => 1.0,
+        false => f32::from(GAIN) * (a[i] - b[i]).abs(),
+    })
+}
+
+/// What should be known of the scenes, each thing once.
+fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Vec<Box<Diagnostic>> {
+    let mut said = BTreeSet::new();
+    let all = a.warnings.iter().chain(&b.warnings);
+    let once = all.filter(|warning| said.insert(&warning.message));
+    let mut warnings: Vec<_> = once.cloned().map(Box::new).collect();
+    if request.autolod.is_some() && !chooses {
+        let other = request.other.display();
+        let does = match request.at.as_slice() {
+            [] => "it only says how far away the eye is",
+            _ => "it changes nothing",
+        };
+        warnings.push(
+            Diagnostic::warning(format!("`{other}` declares no `{AUTO_LOD}`: {does}"))
+                .with_note("a shader that lodc emitted has one, unless it has the form `files`"),
+        );
+    }
+    warnings
+}
+
+fn comparison(
+    request: &CompareRequest,
+    a: &Ready,
+    b: &Ready,
+    distances: Vec<ComparedAt>,
+    warnings: &[Box<Diagnostic>],
+) -> Comparison {
+    let mut inputs: Vec<Input> = a.read_files();
+    for input in b.read_files() {
+        if !inputs.iter().any(|known| known.file == input.file) {
+            inputs.push(input);
+        }
+    }
+    let mut inferences = a.inferred();
+    for inference in b.inferred() {
+        if !inferences.contains(&inference) {
+            inferences.push(inference);
+        }
+    }
+    Comparison {
+        version: env!("CARGO_PKG_VERSION"),
+        command: request.original.command.clone(),
+        original: a.source.name.clone(),
+        other: b.source.name.clone(),
+        scene: a.scene.name.clone(),
+        renderer: "evaluator",
+        seed: a.scene.seed,
+        inputs,
+        rho0: a.scene.rho0(),
+        pixels_per_degree: a.scene.pixels_per_degree,
+        bound: a.scene.reading.name(),
+        distances,
+        warnings: warnings.iter().map(|w| w.message.clone()).collect(),
+        inferences,
+    }
+}

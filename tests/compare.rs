@@ -1,0 +1,419 @@
+//! `lodc compare`: errors that can be worked out by hand, emitted shaders against their reports, scenes for two shaders.
+#![cfg(feature = "search")]
+
+mod fixtures;
+
+use lodc::Result;
+use lodc::compile::{self, CompareRequest, Compared, Request, compare};
+use lodc::emit::{Form, write_atomically};
+use lodc::eval::image::{Space, read_png};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A folder of the test's own with these files.
+fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("compare")
+        .join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("the target folder can be written");
+    for (file, text) in files {
+        fs::write(folder.join(file), text).expect("it can be written");
+    }
+    folder
+}
+
+/// `a.wgsl`, the original, and `b.wgsl` in a folder, with the scene beside the first.
+fn request(folder: &Path) -> CompareRequest {
+    CompareRequest {
+        original: Request {
+            shader: folder.join("a.wgsl"),
+            ..Request::default()
+        },
+        other: folder.join("b.wgsl"),
+        ..CompareRequest::default()
+    }
+}
+
+fn compared(name: &str, a: &str, b: &str, scene: &str) -> Result<Compared> {
+    let folder = folder(name, &[("a.wgsl", a), ("b.wgsl", b), ("a.toml", scene)]);
+    compare(&request(&folder))
+}
+
+fn close(found: f64, by_hand: f64) {
+    assert!((found - by_hand).abs() < 2e-6, "{found}, not {by_hand}");
+}
+
+/// A shader of the whole screen, larger or smaller, of one colour.
+fn screen(colour: &str, size: &str) -> String {
+    format!(
+        "{colour}
+        @vertex fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{
+            let x = array<f32, 6>(-1.0, 1.0, -1.0, -1.0, 1.0, 1.0)[i];
+            let y = array<f32, 6>(-1.0, -1.0, 1.0, 1.0, -1.0, 1.0)[i];
+            return vec4f(x * {size}, y, 0.5, 1.0);
+        }}
+        @fragment fn fs() -> @location(0) vec4f {{ return colour(); }}"
+    )
+}
+
+fn grey(level: &str) -> String {
+    format!("fn colour() -> vec4f {{ return vec4f(vec3f({level}), 1.0); }}")
+}
+
+const ENCODED: &str = "output = \"encoded\"\nresolution = [16, 16]\nlevels = 2\n";
+
+#[test]
+fn errors_worked_out_by_hand() {
+    let scene = format!("{ENCODED}e_max = 0.25\n[distance]\nnearest = 2\nfarthest = 4\n");
+    let a = screen(&grey("0.5"), "1.0");
+    let found = compared("grey", &a, &screen(&grey("0.75"), "1.0"), &scene).unwrap();
+    let at = &found.comparison.distances;
+    assert_eq!((at.len(), at[0].distance, at[1].distance), (2, 2.0, 4.0));
+    for at in at {
+        let error = &at.error;
+        close(error.rmse, 0.25);
+        close(error.floor, 0.0);
+        close(error.excess, 0.25);
+        close(error.max, 0.25);
+        close(error.worst_tile, 0.25);
+        close(error.worst_view, 0.25);
+        // -20 log10(0.25)
+        assert!((error.psnr.unwrap() - 12.041_2).abs() < 1e-4);
+        assert!(error.flip > 0.0);
+        assert_eq!((error.shimmer, at.autolod), (0.0, None));
+    }
+    // Nothing is allowed at the nearest distance; what is allowed at the farthest is used up to rounding.
+    assert!(!at[0].within);
+    assert_eq!((at[0].error.bound, at[1].error.bound), (0.0, 0.25));
+    assert!(found.comparison.failed().is_some());
+
+    // White, of which the other shader draws the left half alone: over black that is wrong wholly, over white not at all.
+    let a = screen(&grey("1.0"), "1.0");
+    let half = a.replace("x * 1.0", "x * 0.5 - 0.5");
+    let found = compared("half", &a, &half, &scene).unwrap();
+    close(found.comparison.distances[0].error.rmse, 0.5);
+    // The other way round it draws what the reference does not cover: the sum is divided by the reference's own half.
+    let found = compared("double", &half, &a, &scene).unwrap();
+    close(found.comparison.distances[0].error.rmse, 0.5_f64.sqrt());
+}
+
+#[test]
+fn a_shader_is_within_its_own_bound_everywhere() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/gbuffer.wgsl");
+    let text = fs::read_to_string(path.with_extension("toml")).expect("the scene is there");
+    let lines = text
+        .lines()
+        .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
+    let lines: Vec<&str> = ["resolution = [24, 24]", "levels = 3"]
+        .into_iter()
+        .chain(lines)
+        .collect();
+    let folder = folder("same", &[]);
+    for inside in ["textures", "lighting"] {
+        fs::create_dir_all(folder.join(inside)).unwrap();
+        for entry in fs::read_dir(path.with_file_name(inside)).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), folder.join(inside).join(entry.file_name())).unwrap();
+        }
+    }
+    fs::write(folder.join("a.toml"), lines.join("\n")).unwrap();
+    fs::copy(&path, folder.join("a.wgsl")).unwrap();
+    fs::copy(&path, folder.join("b.wgsl")).unwrap();
+    let found = compare(&CompareRequest {
+        images: Some(folder.join("pictures")),
+        ..request(&folder)
+    })
+    .unwrap();
+    assert_eq!(found.comparison.distances.len(), 3);
+    for at in &found.comparison.distances {
+        let error = &at.error;
+        assert!(at.within && error.rmse > 0.0, "{at:?}");
+        assert_eq!(
+            (error.rmse, error.excess, at.ratio),
+            (error.floor, 0.0, 1.0)
+        );
+    }
+    // A deferred scene's pictures are lit, and those of one shader do not differ.
+    write_atomically(&found.files).unwrap();
+    for (file, _) in &found.files {
+        let image = read_png(file, Space::Integer).unwrap();
+        let seen = image.texels.iter().any(|t| t[..3] != [0.0; 3]);
+        assert_eq!(
+            seen,
+            !file.to_string_lossy().contains("difference"),
+            "{}",
+            file.display()
+        );
+    }
+    assert!(
+        found.files.len() % 9 == 0 && !found.files.is_empty(),
+        "{}",
+        found.files.len()
+    );
+}
+
+/// An original whose level at autoLOD 1 is darker by 0.25.
+const TWO_LEVELS: &str = "fn colour() -> vec4f {
+        if !(autoLOD >= 1.0) { return vec4f(0.5, 0.5, 0.5, 1.0); }
+        return vec4f(0.25, 0.25, 0.25, 1.0);
+    }";
+
+#[test]
+fn an_emitted_shader_draws_the_level_that_is_asked_for() {
+    let a = screen(&grey("0.5"), "1.0");
+    let ways = [
+        "override autoLOD: f32 = 0.0;\n",
+        "@id(7) override autoLOD: f32 = 0.0;\n",
+        "@group(0) @binding(0) var<uniform> autoLOD: f32;\n",
+    ];
+    for way in ways {
+        let b = screen(&format!("{way}{TWO_LEVELS}"), "1.0");
+        let folder = folder(
+            "level",
+            &[("a.wgsl", &a), ("b.wgsl", &b), ("a.toml", ENCODED)],
+        );
+        let rmse = |at: &[f64], autolod| {
+            let request = CompareRequest {
+                at: at.to_vec(),
+                autolod,
+                ..request(&folder)
+            };
+            let found = compare(&request).unwrap().comparison.distances;
+            assert_eq!(found.len(), at.len().max(1), "{way}");
+            (
+                found[0].error.rmse,
+                found[0].autolod.unwrap(),
+                found[0].distance,
+            )
+        };
+        let (error, autolod, nearest) = rmse(&[2.0], None);
+        assert_eq!((error, autolod), (0.0, 0.0), "{way}");
+        close(rmse(&[2.0], Some(1.0)).0, 0.25);
+        assert_eq!(rmse(&[2.0], Some(0.99)).0, 0.0);
+        // Without a distance it is the one at which autoLOD has the value.
+        let (error, _, there) = rmse(&[], Some(1.0));
+        close(error, 0.25);
+        assert!(there > nearest);
+        let (error, autolod, _) = rmse(&[there], None);
+        close(error, 0.25);
+        close(autolod, 1.0);
+    }
+}
+
+#[test]
+fn emitted_forms_have_the_errors_of_their_report() {
+    let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+    let folder = folder("report", &[]);
+    fs::create_dir_all(folder.join("textures")).unwrap();
+    for entry in fs::read_dir(materials.join("textures")).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(
+            entry.path(),
+            folder.join("textures").join(entry.file_name()),
+        )
+        .unwrap();
+    }
+    let text = fs::read_to_string(materials.join("terrain_blend.toml")).unwrap();
+    let lines = text
+        .lines()
+        .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
+    let lines: Vec<&str> = ["resolution = [48, 48]", "levels = 3"]
+        .into_iter()
+        .chain(lines)
+        .collect();
+    fs::write(folder.join("a.toml"), lines.join("\n")).unwrap();
+    fs::copy(materials.join("terrain_blend.wgsl"), folder.join("a.wgsl")).unwrap();
+    let original = Request {
+        shader: folder.join("a.wgsl"),
+        ..Request::default()
+    };
+    let made = compile::compile(&original, &|_| {}).unwrap();
+    write_atomically(&made.files).unwrap();
+    let of_uniform = Request {
+        form: Some(Form::Uniform),
+        output: Some(folder.join("uniform.lod.wgsl")),
+        ..original.clone()
+    };
+    fs::copy(folder.join("a.lod.toml"), folder.join("uniform.lod.toml")).unwrap();
+    write_atomically(&compile::locked(&of_uniform).unwrap().0).unwrap();
+    assert!(made.report.levels.len() > 1);
+    for other in ["a.lod.wgsl", "uniform.lod.wgsl"] {
+        let found = compare(&CompareRequest {
+            other: folder.join(other),
+            ..request(&folder)
+        })
+        .unwrap();
+        assert!(
+            found.comparison.failed().is_none(),
+            "{other}: {:?}",
+            found.comparison
+        );
+        for level in &made.report.levels {
+            let at = found
+                .comparison
+                .distances
+                .iter()
+                .find(|at| at.distance == level.distance);
+            let at = at.expect("a level starts at a distance of the scene");
+            for (found, reported) in [
+                (at.error.rmse, level.error.rmse),
+                (at.error.floor, level.error.floor),
+                (at.error.worst_tile, level.error.worst_tile),
+                (at.error.worst_view, level.error.worst_view),
+                (at.error.shimmer, level.error.shimmer),
+                (at.error.flip, level.error.flip),
+                (at.error.max, level.error.max),
+            ] {
+                assert!(
+                    (found - reported).abs() < 1e-6,
+                    "{other} at {}: {found} {reported}",
+                    at.distance
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scene_may_name_what_only_one_of_them_has() {
+    let buffer = |name: &str, of: &str| {
+        format!(
+            "struct Paint {{ {of} }} @group(0) @binding(0) var<uniform> {name}: Paint;
+            fn colour() -> vec4f {{ return vec4f(vec3f({name}.level), 1.0); }}"
+        )
+    };
+    let a = screen(
+        &buffer("paint", "dirt: f32, level: f32")
+            .replace("paint.level", "paint.level + 0.0 * paint.dirt"),
+        "1.0",
+    );
+    let b = screen(&buffer("paint", "level: f32"), "1.0");
+    let c = screen(&buffer("other", "level: f32"), "1.0");
+    let scene = format!(
+        "{ENCODED}[uniforms]\n\"paint.dirt\" = 0.3\n\"paint.level\" = {{ samples = [0.5, 0.25] }}\n"
+    );
+    let found = compared("member", &a, &b, &scene).unwrap();
+    assert_eq!(found.comparison.distances[0].error.rmse, 0.0);
+    // Samples of one are pictures of both: 0.5 and 0.25 against 0.5, 0.25 and 0.75 against 0.5, 0.25, 0.5 again.
+    let scene = format!("{scene}\"other.level\" = {{ samples = [0.5, 0.25, 0.75] }}\n");
+    let found = compared("samples", &a, &c, &scene).unwrap();
+    close(
+        found.comparison.distances[0].error.rmse,
+        (0.25_f64.powi(2) / 3.0).sqrt(),
+    );
+    let error = compared("typo", &a, &c, &scene.replace("paint.dirt", "paint.dirty")).unwrap_err();
+    assert!(error.message.contains("`paint.dirty`"), "{error}");
+}
+
+#[test]
+fn a_vertex_file_is_for_shaders_without_a_vertex_stage() {
+    let whole = screen(&grey("0.5"), "1.0");
+    let (vertex, fragment) = whole.split_at(whole.find("@fragment").unwrap());
+    let (colour, vertex) = vertex.split_at(vertex.find("@vertex").unwrap());
+    let bare = format!("{colour}{fragment}");
+    let scene = format!("{ENCODED}[shader]\nvertex = \"v.wgsl\"\n");
+    let files = [
+        ("a.wgsl", &*bare),
+        ("v.wgsl", vertex),
+        ("a.toml", &*scene),
+        ("b.wgsl", &bare),
+        ("whole.wgsl", &whole),
+    ];
+    let folder = folder("vertex", &files);
+    for other in ["b.wgsl", "whole.wgsl"] {
+        let found = compare(&CompareRequest {
+            other: folder.join(other),
+            ..request(&folder)
+        })
+        .unwrap();
+        assert_eq!(found.comparison.distances[0].error.rmse, 0.0, "{other}");
+    }
+}
+
+#[test]
+fn pictures_show_both_and_four_times_the_difference() {
+    let scene = format!("{ENCODED}[views]\ncount = 2\n");
+    let (a, b) = (screen(&grey("0.4"), "1.0"), screen(&grey("0.6"), "0.5"));
+    let folder = folder(
+        "pictures",
+        &[("a.wgsl", &a), ("b.wgsl", &b), ("a.toml", &scene)],
+    );
+    let request = CompareRequest {
+        at: vec![3.0],
+        images: Some(folder.join("out")),
+        ..request(&folder)
+    };
+    let found = compare(&request).unwrap();
+    write_atomically(&found.files).unwrap();
+    let names: Vec<_> = found
+        .files
+        .iter()
+        .map(|(file, _)| file.file_name().unwrap().to_string_lossy())
+        .collect();
+    assert_eq!(
+        names[..3],
+        [
+            "3_view1_a.png",
+            "3_view1_b.png",
+            "3_view1_difference_x4.png"
+        ]
+    );
+    assert_eq!(names.len(), 6);
+    // In the middle both draw; at the left edge only the first one does.
+    let at = |file: usize, x: usize| {
+        let image = read_png(&found.files[file].0, Space::Integer).unwrap();
+        assert_eq!((image.width, image.height), (16, 16));
+        image.texels[8 * 16 + x][0]
+    };
+    assert_eq!((at(0, 8), at(1, 8), at(2, 8)), (102.0, 153.0, 204.0));
+    assert_eq!((at(0, 0), at(1, 0), at(2, 0)), (102.0, 0.0, 255.0));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_check_that_fails_exits_with_1() {
+    use std::process::Command;
+    let files = [
+        ("a.wgsl", &*screen(&grey("0.5"), "1.0")),
+        ("b.wgsl", &*screen(&grey("0.75"), "1.0")),
+        ("a.toml", ENCODED),
+    ];
+    let folder = folder("check", &files);
+    let run = |arguments: &[&str]| {
+        let command = Command::new(env!("CARGO_BIN_EXE_lodc"))
+            .arg("compare")
+            .args(arguments)
+            .current_dir(&folder)
+            .output();
+        let output = command.expect("lodc starts");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (
+            output.status.code(),
+            text(&output.stdout),
+            text(&output.stderr),
+        )
+    };
+    let (code, out, err) = run(&["a.wgsl", "b.wgsl"]);
+    assert!(
+        code == Some(0) && err.is_empty() && out.contains("0.250"),
+        "{code:?} {out} {err}"
+    );
+    let (code, out, err) = run(&["a.wgsl", "b.wgsl", "--check"]);
+    assert!(
+        code == Some(1) && out.contains("0.250") && err.contains("`b.wgsl` is over its bound"),
+        "{code:?} {err}"
+    );
+    let (code, _, err) = run(&["a.wgsl", "a.wgsl", "--check"]);
+    assert!(code == Some(0) && err.is_empty(), "{code:?} {err}");
+    let (code, out, _) = run(&["a.wgsl", "b.wgsl", "--json", "--at", "3"]);
+    let json: serde_json::Value = serde_json::from_str(&out).expect("it is JSON");
+    assert!(code == Some(0));
+    assert_eq!(json["distances"][0]["distance"], 3.0);
+    assert_eq!(json["other"], "b.wgsl");
+    assert!(
+        json["distances"][0]["error"]["excess"]
+            .as_f64()
+            .is_some_and(|e| (e - 0.25).abs() < 1e-6)
+    );
+}
