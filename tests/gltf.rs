@@ -6,7 +6,7 @@
 mod fixtures;
 
 use lodc::compile::{InitRequest, init, normal_form};
-use lodc::eval::draw::draw;
+use lodc::eval::draw::{Blend, DrawState, draw};
 use lodc::eval::image::{encode_png, srgb_byte};
 use lodc::eval::machine::Resource;
 use lodc::eval::program::Program;
@@ -83,7 +83,8 @@ const SHADER: &str = "
     @fragment fn fs(v: V) -> @location(0) vec4f {
         let base = textureSample(base_color_texture, surface_sampler, v.uv) * material.base_color_factor;
         let glow = textureSample(emissive_texture, surface_sampler, v.uv);
-        return base + glow + vec4f(material.metallic_factor * 0.0) + v.rest * 0.0;
+        let colour = base.rgb + glow.rgb + vec3f(material.metallic_factor * 0.0);
+        return vec4f(colour, base.a) + v.rest * 0.0;
     }";
 
 fn bytes_of(numbers: &[f32]) -> Vec<u8> {
@@ -130,7 +131,7 @@ fn json() -> String {
   "materials": [
     {{ "name": "Painted", "pbrMetallicRoughness": {{ "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0.25,
        "baseColorTexture": {{ "index": 0 }} }} }},
-    {{ "name": "Glass", "pbrMetallicRoughness": {{ "baseColorFactor": [0, 0, 1, 1] }},
+    {{ "name": "Glass", "pbrMetallicRoughness": {{ "baseColorFactor": [0, 0, 1, 0.25] }},
        "emissiveFactor": [1, 0.5, 0], "alphaMode": "BLEND" }} ],
   "textures": [{{ "source": 0, "sampler": 0 }}],
   "samplers": [{{ "wrapS": 33071, "wrapT": 33648, "magFilter": 9728 }}],
@@ -234,7 +235,7 @@ fn two_primitives_are_one_mesh_with_a_draw_for_each_material() {
         })
         .collect();
     assert_eq!(factors[0][..5], [0.5, 1.0, 1.0, 1.0, 0.25]);
-    assert_eq!(factors[1][..5], [0.0, 0.0, 1.0, 1.0, 1.0]);
+    assert_eq!(factors[1][..5], [0.0, 0.0, 1.0, 0.25, 1.0]);
     // Textures by draw: what is missing is white, and for emission, whose factor the shader has no place for, the
     // factor itself: black, and orange.
     let texel = |slot, draw: usize| match &per_draw(frame, slot)[draw] {
@@ -268,26 +269,27 @@ fn two_primitives_are_one_mesh_with_a_draw_for_each_material() {
             "emissive_texture = { role = \"emissive\" }: emissive (1, 0.5, 0 for `Glass`; black for `Painted`)",
         ]
     );
-    let warnings: Vec<&str> = scene.warnings.iter().map(|w| w.message.as_str()).collect();
-    assert_eq!(
-        warnings,
-        ["the material `Glass` of the model `a.gltf` is blended, and is drawn opaque"]
-    );
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let glass = DrawState {
+        blend: Blend::Alpha,
+        front_only: true,
+    };
+    assert_eq!(scene.states[..], [DrawState::default(), glass]);
     let files: Vec<&str> = scene.inputs.iter().map(|i| i.name.as_str()).collect();
     assert_eq!(files[2..], ["a.gltf", "a.bin"]);
     // An embedded image is in the buffer's file: that is what the lock hashes.
     assert_eq!(scene.textures[0].files, ["a.bin"]);
 
-    // From the front the second draw hides the first, from behind the first the second.
+    // From the front the second draw is over the first, a quarter of it; from behind the first hides the second, which
+    // has no back besides.
     let source = Source::parse("a.wgsl", SHADER).unwrap();
     let base = normal_form(&source).unwrap();
     let program = |stage| Program::compile(base.module(), base.index(stage).unwrap(), &[]).unwrap();
     let (vertex, fragment) = (program(Stage::Vertex), program(Stage::Fragment));
-    for (frame, expected) in scene
-        .frames(10.0)
-        .iter()
-        .zip([[1.0, 0.5, 1.0], [0.5, srgb_byte(128), 0.0]])
-    {
+    for (frame, expected) in scene.frames(10.0).iter().zip([
+        [0.25 + 0.75 * 0.5, 0.125 + 0.75 * srgb_byte(128), 0.25, 1.0],
+        [0.5, srgb_byte(128), 0.0, 1.0],
+    ]) {
         let (picture, _) = draw(&vertex, &fragment, frame);
         let middle = picture.pixels[32 * 64 + 32];
         for (got, expected) in middle.iter().zip(expected) {
@@ -647,6 +649,7 @@ fn assert_same(one: &Scene, other: &Scene) {
         (one.output, &one.views, one.offsets),
         (other.output, &other.views, other.offsets)
     );
+    assert_eq!(one.states, other.states);
     assert_eq!(one.uniforms, other.uniforms);
     assert_eq!(one.textures.len(), other.textures.len());
     for (a, b) in one.textures.iter().zip(&other.textures) {
@@ -753,8 +756,9 @@ fn the_scene_that_init_writes_reads_back_as_it_was() {
     assert_same(&read("object = \"a.gltf\"\n"), &again);
     assert!(again.inferences.is_empty());
     for line in [
+        "# blend = \"alpha\" # of 1 of 2 materials, as the model says; write it to say otherwise for all",
         "object = \"a.gltf\"                            # 4 triangles, 2 materials, a draw for each",
-        "\"material.base_color_factor\" = \"base-colour-factor\" # vec4<f32>: each material's: 0.5, 1, 1, 1; 0, 0, 1, 1",
+        "\"material.base_color_factor\" = \"base-colour-factor\" # vec4<f32>: each material's: 0.5, 1, 1, 1; 0, 0, 1, 0.25",
         "base_color_texture = { role = \"base-colour\" } # of the model's materials: base-colour (white for `Glass`)",
         "uv1 = \"uv1\"                                  # the second of its texture coordinates",
     ] {

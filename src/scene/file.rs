@@ -24,6 +24,7 @@ pub(super) struct SceneFile {
     pub(super) bound: Option<Spanned<String>>,
     pub(super) offsets: Option<Spanned<i64>>,
     pub(super) pixels_per_degree: Option<Spanned<f64>>,
+    pub(super) blend: Option<Spanned<String>>,
     pub(super) output: Option<Spanned<String>>,
     pub(super) exposure: Option<Spanned<f64>>,
     pub(super) tone_mapping: Option<Spanned<String>>,

@@ -6,6 +6,7 @@
 use super::attributes::unfed;
 use super::objects::Object;
 use super::{Missing, Output, Scene, textures};
+use crate::eval::draw::Blend;
 use crate::front::Source;
 use crate::{Diagnostic, Result};
 use std::fmt::Write;
@@ -221,6 +222,8 @@ impl Writer<'_> {
             );
         }
 
+        self.blend();
+
         self.text.push_str(self.reading);
         self.title("distance");
         let radii = |distance: f64| {
@@ -248,6 +251,25 @@ impl Writer<'_> {
             _ => "spread over the sphere",
         };
         self.line(&format!("count = {}", scene.views.len()), how);
+    }
+
+    /// The line that says how draws get into the picture; what a model's materials say is left to them.
+    fn blend(&mut self) {
+        let blended = self.scene.states.iter();
+        let blended = blended.filter(|state| state.blend != Blend::Opaque).count();
+        match (blended, self.scene.mesh.draws().len()) {
+            (0, _) => self.line(
+                "blend = \"opaque\"",
+                "or alpha, premultiplied, additive: what becomes of the shader's alpha",
+            ),
+            (n, all) if n == all => {
+                self.line("blend = \"alpha\"", "as the model's materials say");
+            }
+            (n, all) => self.line(
+                "# blend = \"alpha\"",
+                &format!("of {n} of {all} materials, as the model says; write it to say otherwise for all"),
+            ),
+        }
     }
 
     /// Uniforms or storage buffers.

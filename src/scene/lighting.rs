@@ -95,6 +95,7 @@ impl SceneLighting {
             height: material.height * material.grid,
             offset: [0.0; 2],
             grid: 1,
+            states: Arc::default(),
             shot: material.shot,
         }
     }

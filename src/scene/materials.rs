@@ -567,6 +567,11 @@ impl Material {
         self.mode() == Some("BLEND")
     }
 
+    /// Whether its back faces are drawn.
+    pub(super) fn double_sided(&self) -> bool {
+        self.json.get("doubleSided") == Some(&Value::Bool(true))
+    }
+
     /// Where the coordinates of its textures come from: the first of the roles that it has.
     pub(super) fn place(&self) -> UvPlace {
         let mut roles = ROLES.iter();

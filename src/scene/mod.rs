@@ -33,7 +33,7 @@ pub use shader::Reading;
 use textures::SceneSampler;
 pub use textures::SceneTexture;
 
-use crate::eval::draw::Lit;
+use crate::eval::draw::{Blend, DrawState, Lit, state_of};
 use crate::eval::machine::Bindings;
 use crate::eval::raster::{Attribute, Coverage, Frame};
 use crate::front::{Source, VertexStage, hash, inputs, read_text};
@@ -91,6 +91,8 @@ pub struct Scene {
     pub pixels_per_degree: f64,
     /// What the shader returns.
     pub output: Output,
+    /// How each of the mesh's draws gets into the picture (see [`Scene::state`]); none when all are opaque.
+    pub states: Arc<[DrawState]>,
     /// Unit vectors from the sphere's centre to the eye.
     pub views: Vec<DVec3>,
     /// Where views come from that decide nothing.
@@ -295,6 +297,11 @@ impl Scene {
             },
             &mut found,
         )?;
+        if lighting.is_some() {
+            found
+                .warnings
+                .extend(opaque(toml, &file_values, &mut settings)?);
+        }
         let mut inferences = said.inferences;
         let fed = attributes::resolve(
             source,
@@ -368,6 +375,7 @@ impl Scene {
             offsets: settings.offsets,
             pixels_per_degree: settings.pixels_per_degree,
             output: settings.output,
+            states: settings.states,
             views: settings.views,
             around: settings.around,
             uniforms,
@@ -478,6 +486,7 @@ impl Scene {
             height: self.resolution[1],
             offset: [0.0, 0.0],
             grid: 1,
+            states: self.states.clone(),
             shot: Shot {
                 direction,
                 distance,
@@ -522,6 +531,11 @@ impl Scene {
             .min((MOST_FRAMES / self.views.len().max(1)).max(1))
     }
 
+    /// How a draw of the mesh gets into the picture.
+    pub fn state(&self, draw: usize) -> DrawState {
+        state_of(&self.states, draw)
+    }
+
     /// What autoLOD is computed from at a distance.
     pub fn view(&self, distance: f64) -> autolod::View {
         autolod::View {
@@ -549,6 +563,30 @@ impl Scene {
     pub fn bound(&self, distance: f64) -> f64 {
         autolod::bound(distance, self.nearest, self.farthest, self.e_max, self.q)
     }
+}
+
+/// What a deferred scene draws is opaque: its targets hold one surface. Says so when a model's materials are not.
+fn opaque(
+    toml: Toml,
+    file: &file::SceneFile,
+    settings: &mut Settings,
+) -> Result<Option<Diagnostic>> {
+    let blended = settings.states.iter();
+    let blended = blended.filter(|state| state.blend != Blend::Opaque).count();
+    if blended == 0 {
+        return Ok(None);
+    }
+    let why = "the targets of a deferred scene hold one surface a pixel: blended ones are drawn forward, in a scene without `[lighting]`";
+    if let Some(said) = &file.blend {
+        let message = "a deferred scene is opaque";
+        return Err(toml.error(message, said.span(), "").with_note(why));
+    }
+    settings.states = Arc::default();
+    let message = match blended {
+        1 => "a blended material of the model is drawn opaque".to_owned(),
+        n => format!("{n} blended materials of the model are drawn opaque"),
+    };
+    Ok(Some(*Diagnostic::warning(message).with_note(why)))
 }
 
 /// What is drawn when the scene names no object: a sphere, or, for a vertex stage that takes nothing from a

@@ -5,12 +5,14 @@ use super::file::{SceneFile, Toml, suggest};
 use super::gltf::Model;
 use super::mesh::Mesh;
 use super::objects::{Object, bounding_sphere};
+use crate::eval::draw::{Blend, DrawState};
 use crate::eval::raster::MAX_EDGE;
 use crate::{Diagnostic, Result};
 use glam::{DMat4, DVec3};
 use lodc_passes::autolod::{self, BoundReading};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use toml::Spanned;
 
 /// What the shader's colour is, and how it gets to the display.
@@ -82,6 +84,8 @@ pub(super) struct Settings {
     pub(super) offsets: usize,
     pub(super) pixels_per_degree: f64,
     pub(super) output: Output,
+    /// Of each draw of the mesh; none when all are opaque.
+    pub(super) states: Arc<[DrawState]>,
     pub(super) views: Vec<DVec3>,
     pub(super) around: Around,
     pub(super) warnings: Vec<Diagnostic>,
@@ -154,6 +158,7 @@ impl Settings {
         let levels = whole("levels", &file.levels, 5, 1, MOST_LEVELS)?;
         let (nearest, farthest) = read_distances(toml, file, &sphere)?;
         let (views, around) = read_views(toml, file, object)?;
+        let states = read_states(toml, file, loaded.as_ref())?;
         let mut warnings = match &loaded {
             Some(loaded) => loaded.warnings.clone(),
             None => Vec::new(),
@@ -222,6 +227,7 @@ impl Settings {
                 "1 to 1000 pixels",
             )?,
             output: read_output(toml, file)?,
+            states,
             views,
             around,
             warnings,
@@ -399,6 +405,40 @@ fn read_output(toml: Toml, file: &SceneFile) -> Result<Output> {
         }
         _ => Err(word("output", output, &["display", "encoded", "linear"])),
     }
+}
+
+/// How each draw gets into the picture: as the scene says for all, or else as the model's materials do. What is blended
+/// and not double-sided shows its front alone.
+fn read_states(toml: Toml, file: &SceneFile, model: Option<&Model>) -> Result<Arc<[DrawState]>> {
+    let said = match &file.blend {
+        None => None,
+        Some(name) => Some(Blend::of_name(name.get_ref()).ok_or_else(|| {
+            toml.unknown("blending", name, Blend::ALL.into_iter().map(Blend::name))
+        })?),
+    };
+    let state = |blend: Blend, double_sided: bool| DrawState {
+        blend,
+        front_only: blend != Blend::Opaque && !double_sided,
+    };
+    let states: Vec<DrawState> = match model {
+        Some(model) => model
+            .materials
+            .iter()
+            .map(|material| {
+                let own = match material.blends() {
+                    true => Blend::Alpha,
+                    false => Blend::Opaque,
+                };
+                state(said.unwrap_or(own), material.double_sided())
+            })
+            .collect(),
+        None => vec![state(said.unwrap_or_default(), true)],
+    };
+    let blended = states.iter().any(|state| state.blend != Blend::Opaque);
+    Ok(match blended {
+        true => states.into(),
+        false => Arc::default(),
+    })
 }
 
 fn read_views(toml: Toml, file: &SceneFile, object: Object) -> Result<(Vec<DVec3>, Around)> {
@@ -589,6 +629,11 @@ mod tests {
                 "output = \"gamma\"",
                 "there is no output `gamma`",
                 "\"gamma\"",
+            ),
+            (
+                "blend = \"over\"",
+                "there is no blending `over`",
+                "\"over\"",
             ),
             (
                 "exposure = 2.0",

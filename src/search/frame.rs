@@ -1,8 +1,12 @@
 //! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it; and a frame as a
 //! picture, for people.
 
-use super::error::{FrameError, Reference, TILE, Tally, displayed, encoded};
-use crate::eval::draw::{Lit, Shading, each_visible, resolve, seen, shade_into};
+use super::error::{
+    BACKGROUNDS, FrameError, Reference, ReferencePixel, Shown, TILE, Tally, displayed, encoded,
+    held, through,
+};
+use crate::eval::draw::{Layers, Lit, Shading, each_visible, resolve, seen, shade_into};
+use crate::eval::image::Picture;
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
@@ -213,11 +217,11 @@ pub(super) fn shown(pen: &Pen<'_>, frame: &Frame) -> Vec<[f32; 3]> {
         &frame.bindings,
         &mut shading,
     );
-    let picture = resolve(&coverage, &shading);
+    let (picture, _) = over_black(&coverage, &shading, pen.scene.output);
     let pixels = picture.pixels.iter().zip(&picture.covered);
     pixels
-        .map(|(colour, covered)| match *covered > 0.0 {
-            true => encoded(pen.scene.output, *colour),
+        .map(|([r, g, b, _], covered)| match *covered > 0.0 {
+            true => encoded([*r, *g, *b]),
             false => [0.0; 3],
         })
         .collect()
@@ -230,14 +234,9 @@ fn reference_of<'c>(
     coverages: impl Iterator<Item = &'c Coverage>,
     output: Output,
 ) -> (Reference, Vec<u32>) {
-    let mut picture = resolve(fine, shading);
-    for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
-        if *covered > 0.0 {
-            let [r, g, b] = displayed(output, *colour);
-            *colour = [r, g, b, 1.0];
-        }
-    }
+    let (picture, behind) = over_black(fine, shading, output);
     let picture = picture.box_filtered(fine.grid);
+    let behind = behind.map(|behind| behind.box_filtered(fine.grid));
     let mut pixels: Vec<u32> = (0..)
         .zip(&picture.covered)
         .filter(|(_, c)| **c > 0.0)
@@ -247,11 +246,45 @@ fn reference_of<'c>(
     pixels.sort_unstable();
     pixels.dedup();
     let reference = Reference::new(pixels.iter().map(|pixel| {
-        let [r, g, b, _] = picture.pixels[*pixel as usize];
+        let at = *pixel as usize;
+        let [r, g, b, _] = picture.pixels[at];
+        let covered = picture.covered[at];
+        let through = match &behind {
+            Some(behind) => [0, 1, 2].map(|i| behind.pixels[at][i]),
+            None => [1.0 - covered; 3],
+        };
         let place = [*pixel % picture.width, *pixel / picture.width];
-        (place, [r, g, b], picture.covered[*pixel as usize])
+        (place, ReferencePixel::new([r, g, b], through), covered)
     }));
     (reference, pixels)
+}
+
+/// What a display shows over black, in linear light, and, where fragments are blended, how much more over white.
+fn over_black(fine: &Coverage, shading: &Shading, output: Output) -> (Picture, Option<Picture>) {
+    if !fine.blends() {
+        let mut picture = resolve(fine, shading);
+        for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
+            if *covered > 0.0 {
+                let [r, g, b] = displayed(output, *colour);
+                *colour = [r, g, b, 1.0];
+            }
+        }
+        return (picture, None);
+    }
+    let mut picture = Picture::empty(fine.width, fine.height);
+    let mut behind = Picture::empty(fine.width, fine.height);
+    let layers = Layers::new(fine, shading, picture.pixels.len(), |_, pixel| pixel);
+    for place in 0..picture.pixels.len() {
+        let colour = layers.compose(place, shading, |colour| held(output, colour));
+        let [r, g, b] = through(output, colour.unwrap_or_default());
+        behind.pixels[place] = [r, g, b, 1.0];
+        if let Some(colour) = colour {
+            let [r, g, b] = displayed(output, colour);
+            picture.pixels[place] = [r, g, b, 1.0];
+            picture.covered[place] = 1.0;
+        }
+    }
+    (picture, Some(behind))
 }
 
 impl Drawing {
@@ -290,18 +323,26 @@ impl Drawing {
         );
     }
 
-    /// What a display shows at each pixel of the reference.
-    fn colours(&self, shading: &Shading, pixels: usize, output: Output) -> Vec<Option<[f32; 3]>> {
-        let mut colours = vec![None; pixels];
-        each_visible(
-            &self.coverage,
-            shading,
-            pixels,
-            |fragment, _| self.places[fragment],
-            |place, fragment| {
-                colours[place as usize] = Some(encoded(output, shading.colours[fragment]));
-            },
-        );
+    /// What a display shows at each pixel of the reference, over each background.
+    fn colours(&self, shading: &Shading, pixels: usize, output: Output) -> Vec<Shown> {
+        let mut colours = vec![BACKGROUNDS; pixels];
+        let place = |fragment: usize, _| self.places[fragment];
+        if self.coverage.blends() {
+            let layers = Layers::new(&self.coverage, shading, pixels, place);
+            for (place, shown) in colours.iter_mut().enumerate() {
+                let colour = layers.compose(place, shading, |colour| held(output, colour));
+                if let Some(colour) = colour {
+                    let black = displayed(output, colour);
+                    let more = through(output, colour);
+                    let white = std::array::from_fn(|i| black[i] + more[i]);
+                    *shown = [black, white].map(encoded);
+                }
+            }
+            return colours;
+        }
+        each_visible(&self.coverage, shading, pixels, place, |place, fragment| {
+            colours[place as usize] = [encoded(displayed(output, shading.colours[fragment])); 2];
+        });
         colours
     }
 }

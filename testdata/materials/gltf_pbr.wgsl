@@ -123,5 +123,5 @@ fn fs_main(in: VertexOutput) -> @location(0) vec4f {
     let around = (1.0 - metallic) * base.rgb * sky(n, 1.0) + edge * sky(reflect(-v, n), alpha);
 
     let light = direct + around * occlusion + emission;
-    return vec4f(light / (1.0 + 0.25 * light), 1.0);
+    return vec4f(light / (1.0 + 0.25 * light), base.a);
 }

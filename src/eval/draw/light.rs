@@ -318,6 +318,7 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
             height: size,
             offset: [0.0; 2],
             grid,
+            states: Arc::default(),
             shot: Default::default(),
         }
     }

@@ -1,10 +1,13 @@
 //! Draws a frame: rasterises once, shades as often as there are variants.
 
+mod blend;
 mod format;
 mod light;
 #[cfg(test)]
 mod tests;
 
+pub use blend::{Blend, DrawState};
+pub(crate) use blend::{Layers, state_of};
 pub use format::Format;
 pub use light::{Lighting, Lit, Plane};
 
@@ -35,6 +38,15 @@ pub struct Shading {
     pub depths: Vec<f32>,
     /// What was executed.
     pub profile: Profile,
+}
+
+impl Shading {
+    /// The depth of a fragment: what the program returned, clamped to the viewport's range (NaN is 0), or else that
+    /// of its triangle.
+    pub(crate) fn depth(&self, fragment: usize, of_triangle: f32) -> f32 {
+        let own = self.depths.get(fragment).copied();
+        own.unwrap_or(of_triangle).max(0.0)
+    }
 }
 
 /// Shades every fragment, in parallel, with all colours that the program returns; the result does not depend on the number of threads.
@@ -125,9 +137,22 @@ fn shade_targets(
         .unwrap_or_else(|| Machine::new(fragment, bindings).profile());
 }
 
-/// The picture in fine pixels, fragments that hide each other resolved. Background pixels are 0.
+/// The picture in fine pixels, fragments that hide each other resolved. Background pixels are 0. Where draws are
+/// blended, pixels are premultiplied colours with coverage, as in a target of floats, and those that look the same over
+/// any background are background.
 pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
     let mut picture = Picture::empty(coverage.width, coverage.height);
+    if coverage.blends() {
+        let layers = Layers::new(coverage, shading, picture.pixels.len(), |_, pixel| pixel);
+        let held = |[r, g, b, a]: [f32; 4]| [r, g, b, a.clamp(0.0, 1.0)];
+        let pixels = picture.pixels.iter_mut().zip(&mut picture.covered);
+        for (place, (pixel, covered)) in pixels.enumerate() {
+            if let Some(composed) = layers.compose(place, shading, held) {
+                (*pixel, *covered) = (composed, 1.0);
+            }
+        }
+        return picture;
+    }
     for (pixel, fragment) in nearest(coverage, shading).into_iter().enumerate() {
         if let Some(fragment) = fragment {
             picture.pixels[pixel] = shading.colours[fragment as usize];
@@ -137,17 +162,27 @@ pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
     picture
 }
 
-/// The coverage with those fragments alone that the picture shows; the others have become helpers.
+/// The coverage with those fragments alone that the picture is made of; the others have become helpers.
 /// What a shader that discards computes where it is hidden should not count as seen.
 pub fn seen(coverage: &Coverage, shading: &Shading) -> Coverage {
-    let nearest = nearest(coverage, shading);
+    let mut shown = vec![false; coverage.fragments];
+    let places = coverage.width as usize * coverage.height as usize;
+    if coverage.blends() {
+        let layers = Layers::new(coverage, shading, places, |_, pixel| pixel);
+        for (fragment, _) in (0..places).flat_map(|place| layers.at(place)) {
+            shown[fragment] = true;
+        }
+    } else {
+        for fragment in nearest(coverage, shading).into_iter().flatten() {
+            shown[fragment as usize] = true;
+        }
+    }
     let mut seen = coverage.clone();
     seen.fragments = 0;
     for (block, before) in seen.blocks.iter_mut().zip(&coverage.blocks) {
         block.first = seen.fragments;
         for (i, lane) in before.covered.lanes().enumerate() {
-            let fragment = (before.first + i) as u32;
-            if nearest[before.pixels[lane] as usize] != Some(fragment) {
+            if !shown[before.first + i] {
                 block.covered.0[lane / 64] &= !(1 << (lane % 64));
                 block.pixels[lane] = u32::MAX;
             }
@@ -187,9 +222,7 @@ pub(crate) fn each_visible(
             }
             let place = place(fragment, block.pixels[lane]);
             if coverage.late {
-                let own = shading.depths.get(fragment);
-                // Clamped to the viewport's range; NaN is 0.
-                let depth = own.copied().unwrap_or(block.depths[lane]).max(0.0);
+                let depth = shading.depth(fragment, block.depths[lane]);
                 let nearest = &mut depths[place as usize];
                 if depth >= *nearest {
                     continue;

@@ -33,6 +33,7 @@ fn coverage(depths: [f32; 3]) -> Coverage {
         fragments: 3,
         slots: Vec::new(),
         late: true,
+        states: Arc::default(),
         vertex_profile: Profile::default(),
     }
 }
@@ -180,6 +181,7 @@ fn frame(mesh: Mesh, size: u32, image: Image) -> Frame {
         height: size,
         offset: [0.0; 2],
         grid: 1,
+        states: Arc::default(),
         shot: Default::default(),
     }
 }
@@ -369,4 +371,69 @@ fn threads_do_not_change_the_bits() {
         assert_eq!(bits(&one), bits(&other));
         assert_eq!(one_profile, profile);
     }
+}
+
+/// Two draws of the three fragments of [`coverage`]: the first one's are those of the first block.
+fn blended(depths: [f32; 3], blends: [Blend; 2]) -> Coverage {
+    let mut coverage = coverage(depths);
+    let mut second = coverage.blocks[0].clone();
+    coverage.blocks[0].covered = Mask([0b11, 0, 0, 0]);
+    second.covered = Mask([0b1_0000, 0, 0, 0]);
+    (second.draw, second.first) = (1, 2);
+    coverage.blocks.push(second);
+    coverage.states = blends
+        .map(|blend| DrawState {
+            blend,
+            front_only: false,
+        })
+        .into();
+    coverage
+}
+
+#[test]
+fn blended_fragments_are_composed_from_the_farthest_to_the_nearest() {
+    use Blend::{Additive, Alpha, Opaque, Premultiplied};
+    let mut shading = shading([true; 3]);
+    // On the first pixel red and blue, on the second green.
+    shading.colours = vec![
+        [1.0, 0.0, 0.0, 0.5],
+        [0.0, 1.0, 0.0, 0.25],
+        [0.0, 0.0, 0.5, 0.25],
+    ];
+    let shown = |depths, blends| resolve(&blended(depths, blends), &shading);
+    for (near, blends, first) in [
+        // Blue over red over nothing, and red over blue.
+        (2, [Alpha, Alpha], [0.375, 0.0, 0.125, 0.625]),
+        (0, [Alpha, Alpha], [0.5, 0.0, 0.0625, 0.625]),
+        (2, [Alpha, Premultiplied], [0.375, 0.0, 0.5, 0.625]),
+        (2, [Alpha, Additive], [0.5, 0.0, 0.125, 0.5]),
+        (2, [Opaque, Alpha], [0.75, 0.0, 0.125, 1.0]),
+        (2, [Opaque, Additive], [1.0, 0.0, 0.125, 1.0]),
+        // What is opaque hides what is behind, whichever is drawn first.
+        (0, [Opaque, Alpha], [1.0, 0.0, 0.0, 1.0]),
+        (0, [Alpha, Opaque], [0.5, 0.0, 0.25, 1.0]),
+        (2, [Alpha, Opaque], [0.0, 0.0, 0.5, 1.0]),
+        // Of equal depths the later one is over the other, but not over what is opaque.
+        (1, [Alpha, Alpha], [0.375, 0.0, 0.125, 0.625]),
+        (1, [Opaque, Alpha], [1.0, 0.0, 0.0, 1.0]),
+    ] {
+        let depths = match near {
+            0 => [0.2, 0.5, 0.5],
+            1 => [0.2, 0.5, 0.2],
+            _ => [0.5, 0.5, 0.2],
+        };
+        let picture = shown(depths, blends);
+        assert_eq!(picture.pixels[0], first, "{near} {blends:?}");
+        assert_eq!(picture.covered, [1.0, 1.0]);
+    }
+    // Nothing shows where alpha is 0, or the fragment is gone.
+    shading.colours[1][3] = 0.0;
+    shading.alive = vec![false, true, false];
+    let picture = resolve(&blended([0.5; 3], [Alpha; 2]), &shading);
+    assert_eq!(picture, Picture::empty(2, 1));
+    // What adds light hides nothing, and is seen.
+    shading.colours[1] = [0.5, 0.0, 0.0, 1.0];
+    let picture = resolve(&blended([0.5; 3], [Additive; 2]), &shading);
+    assert_eq!(picture.pixels[1], [0.5, 0.0, 0.0, 0.0]);
+    assert_eq!(picture.covered, [0.0, 1.0]);
 }

@@ -20,6 +20,7 @@ mod vertices;
 #[cfg(feature = "gpu")]
 pub(crate) use vertices::attribute;
 
+use super::draw::{Blend, DrawState, state_of};
 use super::lane::{LANES, Mask, Words};
 use super::machine::{Bindings, Profile};
 use super::program::{Program, Slot};
@@ -74,6 +75,9 @@ pub struct Frame {
     /// How many fine pixels a pixel has along each axis: 1 to draw, 4 for the reference.
     /// Derivatives are those between fine pixels.
     pub grid: u32,
+    /// How each of the mesh's draws gets into the picture; one beyond the last is as the last, and without any all
+    /// is opaque.
+    pub states: Arc<[DrawState]>,
     /// What it is a picture of.
     pub shot: Shot,
 }
@@ -94,9 +98,12 @@ pub struct Coverage {
     /// What each word of [`Block::inputs`] is: the fragment program's inputs.
     pub slots: Vec<Slot>,
     /// Whether fragments hide each other only after shading, since the shader may discard them or move their
-    /// depth. If not, each pixel has one covered fragment at most, in tiles of 16 x 16 pixels.
+    /// depth. If not, each pixel has one covered fragment of opaque draws at most, in tiles of 16 x 16 pixels, and
+    /// those of blended draws that it does not hide, in the order of the triangles.
     /// If so, all of a pixel's fragments are here, in the order of the triangles.
     pub late: bool,
+    /// As [`Frame::states`].
+    pub states: Arc<[DrawState]>,
     /// What the vertex program executed.
     pub vertex_profile: Profile,
 }
@@ -139,7 +146,7 @@ pub fn rasterize(vertex: &Program, fragment: &Program, frame: &Frame) -> Coverag
         fragment.inputs(),
         &frame.mesh,
         &Target::of(frame),
-        late,
+        (late, &frame.states),
     )
 }
 
@@ -150,26 +157,34 @@ fn cover(
     inputs: &[Slot],
     mesh: &Mesh,
     target: &Target,
-    late: bool,
+    (late, states): (bool, &Arc<[DrawState]>),
 ) -> Coverage {
     let mut triangles = Vec::new();
     // Where the triangles of each draw end.
     let mut ends = Vec::new();
-    for draw in mesh.draws() {
+    // Those of blended draws.
+    let mut blended = Vec::new();
+    for (number, draw) in mesh.draws().into_iter().enumerate() {
+        let state = state_of(states, number);
         let indices = mesh
             .indices
             .get(3 * draw.triangles.start..3 * draw.triangles.end);
         let corners = indices.unwrap_or_default().chunks_exact(3).enumerate();
+        let first = triangles.len();
         triangles.extend(corners.filter_map(|(i, corners)| {
             let corners = [corners[0], corners[1], corners[2]];
             triangle::Triangle::new(i as u32, corners, &vertices.positions, target)
+                .filter(|triangle| triangle.front || !state.front_only)
         }));
         ends.push(triangles.len());
+        if state.blend != Blend::Opaque {
+            blended.push(first..triangles.len());
+        }
     }
     let quads = if late {
         quads::in_order(&triangles)
     } else {
-        quads::visible(&triangles, target)
+        quads::visible(&triangles, &blended, target)
     };
     let quads = quads::by_draw(quads, &ends);
     let blocks = quads::blocks(&quads, &triangles, &vertices, outputs, inputs, target);
@@ -182,7 +197,21 @@ fn cover(
         fragments,
         slots: inputs.to_vec(),
         late,
+        states: states.clone(),
         vertex_profile: vertices.profile,
+    }
+}
+
+impl Coverage {
+    /// How a draw gets into the picture.
+    pub(crate) fn state(&self, draw: usize) -> DrawState {
+        state_of(&self.states, draw)
+    }
+
+    /// Whether fragments are blended.
+    pub fn blends(&self) -> bool {
+        let mut states = self.states.iter();
+        states.any(|state| state.blend != Blend::Opaque)
     }
 }
 

@@ -76,6 +76,7 @@ impl Coverage {
             blocks,
             fragments,
             slots: self.slots.clone(),
+            states: self.states.clone(),
             vertex_profile: self.vertex_profile.clone(),
             ..*self
         }

@@ -7,6 +7,7 @@ use crate::eval::lane::{LANES, Mask};
 use crate::eval::program::Slot;
 use naga::{Binding, BuiltIn, Interpolation, ScalarKind};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Edge of a tile in pixels: 64 quads, so that a block of a surface that fills the screen is one tile.
 const TILE: u32 = 16;
@@ -22,12 +23,20 @@ pub(super) struct Quad {
     mask: u8,
 }
 
-/// The fragments that are nearest in their pixel, tile by tile. Of equal depths the first triangle wins.
-pub(super) fn visible(triangles: &[Triangle], target: &Target) -> Vec<Quad> {
+/// The fragments that are nearest in their pixel, tile by tile. Of equal depths the first triangle wins. Behind them
+/// those of blended triangles, which are given as ranges, that are in front of what is nearest otherwise.
+pub(super) fn visible(
+    triangles: &[Triangle],
+    blended: &[Range<usize>],
+    target: &Target,
+) -> Vec<Quad> {
     const NONE: u32 = u32::MAX;
     let place = |x: u32, y: u32| y as usize * target.width as usize + x as usize;
     let mut nearest = vec![(1.0_f32, NONE); place(0, target.height)];
     for (i, triangle) in triangles.iter().enumerate() {
+        if blended.iter().any(|range| range.contains(&i)) {
+            continue;
+        }
         triangle.scan(|x, y, mask| {
             for (x, y) in pixels(x, y, mask) {
                 let seen = &mut nearest[place(x, y)];
@@ -64,6 +73,9 @@ pub(super) fn visible(triangles: &[Triangle], target: &Target) -> Vec<Quad> {
             }
         }
     }
+    for i in blended.iter().cloned().flatten() {
+        before(&triangles[i], i, &mut quads, |x, y| nearest[place(x, y)].0);
+    }
     quads
 }
 
@@ -71,21 +83,26 @@ pub(super) fn visible(triangles: &[Triangle], target: &Target) -> Vec<Quad> {
 pub(super) fn in_order(triangles: &[Triangle]) -> Vec<Quad> {
     let mut quads = Vec::new();
     for (i, triangle) in triangles.iter().enumerate() {
-        triangle.scan(|x, y, mask| {
-            let mask = pixels(x, y, mask)
-                .filter(|&(x, y)| triangle.depth(x, y).is_some())
-                .fold(0, |kept, (px, py)| kept | 1 << (px - x + 2 * (py - y)));
-            if mask != 0 {
-                quads.push(Quad {
-                    triangle: i as u32,
-                    x,
-                    y,
-                    mask,
-                });
-            }
-        });
+        before(triangle, i, &mut quads, |_, _| 1.0);
     }
     quads
+}
+
+/// The fragments of a triangle, the `i`-th, that are nearer than what is at their pixel.
+fn before(triangle: &Triangle, i: usize, quads: &mut Vec<Quad>, nearest: impl Fn(u32, u32) -> f32) {
+    triangle.scan(|x, y, mask| {
+        let mask = pixels(x, y, mask)
+            .filter(|&(x, y)| triangle.depth(x, y).is_some_and(|d| d < nearest(x, y)))
+            .fold(0, |kept, (px, py)| kept | 1 << (px - x + 2 * (py - y)));
+        if mask != 0 {
+            quads.push(Quad {
+                triangle: i as u32,
+                x,
+                y,
+                mask,
+            });
+        }
+    });
 }
 
 /// The quads of each draw, in the order in which they are. `ends` says where the triangles of each draw end.

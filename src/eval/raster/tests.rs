@@ -2,10 +2,11 @@
 
 use super::vertices::Vertices;
 use super::{Block, Coverage, Target, cover};
+use crate::eval::draw::{Blend, DrawState};
 use crate::eval::lane::LANES;
 use crate::eval::machine::Profile;
 use crate::eval::program::Slot;
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{Draw, Mesh};
 use naga::{Binding, BuiltIn, Interpolation, ScalarKind};
 use std::collections::BTreeMap;
 
@@ -52,6 +53,8 @@ struct Case {
     grid: u32,
     offset: [f32; 2],
     late: bool,
+    /// Of each triangle, when each is a draw.
+    states: Vec<DrawState>,
 }
 
 impl Case {
@@ -64,6 +67,7 @@ impl Case {
             grid: 1,
             offset: [0.0; 2],
             late: false,
+            states: Vec::new(),
         }
     }
 
@@ -87,10 +91,16 @@ impl Case {
             &Mesh {
                 positions: vec![[0.0; 3]; self.positions.len()],
                 indices: self.indices.clone(),
+                draws: (0..self.states.len())
+                    .map(|i| Draw {
+                        vertices: 3 * i..3 * i + 3,
+                        triangles: i..i + 1,
+                    })
+                    .collect(),
                 ..Mesh::default()
             },
             &target,
-            self.late,
+            (self.late, &self.states.clone().into()),
         )
     }
 }
@@ -460,4 +470,61 @@ fn blocks_are_full_and_in_order() {
     // The first block is the first tile.
     let block = &coverage.blocks[0];
     assert!(block.pixels.iter().all(|&p| p % 37 < 16 && p / 37 < 16));
+}
+
+#[test]
+fn blended_draws_are_tested_against_opaque_ones_and_hide_nothing() {
+    // The lower left half of the picture at three depths, and its upper right half from behind.
+    let lower = |z| {
+        [
+            at(0.0, 0.0, z, 1.0),
+            at(0.0, 8.0, z, 1.0),
+            at(8.0, 8.0, z, 1.0),
+        ]
+    };
+    let back = [
+        at(0.0, 0.0, 0.5, 1.0),
+        at(8.0, 8.0, 0.5, 1.0),
+        at(8.0, 0.0, 0.5, 1.0),
+    ];
+    let [a, b, c] = [0.5, 0.25, 0.75].map(lower);
+    let positions = [a, b, c, [back[0], back[2], back[1]]].concat();
+    let mut case = Case::new(&positions, &(0..12).collect::<Vec<_>>());
+    let one = fragments(&case.cover(&[])).count();
+    let state = |blend, front_only| DrawState { blend, front_only };
+    let blended = state(Blend::Alpha, false);
+    let mut of_draws = |states: [DrawState; 4]| {
+        case.states = states.to_vec();
+        let coverage = case.cover(&[]);
+        let mut draws = [0; 4];
+        for (block, _) in fragments(&coverage) {
+            draws[block.draw] += 1;
+        }
+        draws
+    };
+    let opaque = DrawState::default();
+    let [_, half, _, other] = of_draws([opaque; 4]);
+    assert_eq!(half + other, one);
+    assert_eq!(
+        of_draws([opaque, blended, opaque, opaque]),
+        [half, half, 0, other]
+    );
+    assert_eq!(
+        of_draws([opaque, blended, blended, opaque]),
+        [half, half, 0, other]
+    );
+    assert_eq!(
+        of_draws([blended, blended, opaque, blended]),
+        [half, half, half, other]
+    );
+    let fronts = of_draws([state(Blend::Alpha, true); 4]);
+    assert!(
+        fronts == [half, half, half, 0] || fronts == [0, 0, 0, other],
+        "{fronts:?}"
+    );
+    case.late = true;
+    assert_eq!(
+        fragments(&case.cover(&[])).count(),
+        3 * fronts[0] + fronts[3]
+    );
 }

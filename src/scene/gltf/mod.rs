@@ -6,8 +6,8 @@
 //!
 //! Node transforms are put into the vertices, so that the model matrix of a scene means the whole object. Images are
 //! decoded when a shader wants them, not before. What a file may not do (huge counts, indices out of range, positions
-//! that are no numbers) is an error that names the primitive; what lodc does not draw (skins, morph targets, lines,
-//! blending) is a warning.
+//! that are no numbers) is an error that names the primitive; what lodc does not draw (skins, morph targets, lines)
+//! is a warning.
 
 mod accessor;
 mod bytes;
@@ -559,12 +559,6 @@ fn merge(draws: Vec<(Option<usize>, Material, Vec<Part>)>) -> (Mesh, Vec<Materia
 /// What of a material is not drawn as it is meant.
 fn about(name: &str, material: &Material) -> Vec<Diagnostic> {
     let mut warnings = Vec::new();
-    if material.blends() {
-        warnings.push(*Diagnostic::warning(format!(
-            "the material `{}` of the model `{name}` is blended, and is drawn opaque",
-            material.name
-        )));
-    }
     let elsewhere = material.elsewhere();
     if !elsewhere.is_empty() {
         let warning = Diagnostic::warning(format!(

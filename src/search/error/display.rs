@@ -38,9 +38,37 @@ pub(crate) fn displayed(output: Output, colour: [f32; 4]) -> [f32; 3] {
     })
 }
 
-/// The same as sRGB, 0..1: what the error compares.
-pub(crate) fn encoded(output: Output, colour: [f32; 4]) -> [f32; 3] {
-    displayed(output, colour).map(|c| if c.is_nan() { c } else { srgb_encode(c) })
+/// What the target holds of a fragment's colour that is to be blended: 0..1 in a target that a display shows, light
+/// without a limit in another. Alpha is 0..1; NaN stays NaN.
+pub(crate) fn held(output: Output, colour: [f32; 4]) -> [f32; 4] {
+    let [r, g, b, a] = colour;
+    let [r, g, b] = match output {
+        Output::Display | Output::Encoded => [r, g, b].map(|c| c.clamp(0.0, 1.0)),
+        Output::Linear { .. } => [r, g, b],
+    };
+    [r, g, b, a.clamp(0.0, 1.0)]
+}
+
+/// What a display shows over a white background more than over a black one where a pixel holds a premultiplied colour
+/// and coverage: the light that comes through, 0..1. Over the black one it shows [`displayed`].
+///
+/// Blending is done where the target does it: in linear light, or, when the shader returns encoded values, in those.
+/// Light without a limit meets the background when it is on the display, for which no light is white there.
+pub(crate) fn through(output: Output, [r, g, b, a]: [f32; 4]) -> [f32; 3] {
+    let kept = 1.0 - a;
+    let black = displayed(output, [r, g, b, a]);
+    match output {
+        Output::Display | Output::Linear { .. } => black.map(|black| kept.min(1.0 - black)),
+        Output::Encoded => {
+            let white = displayed(output, [r + kept, g + kept, b + kept, a]);
+            std::array::from_fn(|i| white[i] - black[i])
+        }
+    }
+}
+
+/// Linear light as sRGB, 0..1: what the error compares. NaN stays NaN.
+pub(crate) fn encoded(light: [f32; 3]) -> [f32; 3] {
+    light.map(|c| if c.is_nan() { c } else { srgb_encode(c) })
 }
 
 #[cfg(test)]
@@ -80,7 +108,7 @@ mod tests {
             assert!((found - light).abs() < 1e-6, "{output:?} {value}: {found}");
         }
         // 1.055 * 0.25^(1 / 2.4) - 0.055
-        let shown = encoded(Output::Display, [0.25, 0.25, 0.25, 1.0]);
+        let shown = encoded(displayed(Output::Display, [0.25, 0.25, 0.25, 1.0]));
         assert!((shown[0] - 0.537_099).abs() < 1e-6, "{shown:?}");
     }
 
@@ -105,7 +133,10 @@ mod tests {
                 assert_eq!(shows(output, value), light, "{output:?} {value}");
             }
             assert!(displayed(output, [f32::NAN; 4])[0].is_nan(), "{output:?}");
-            assert!(encoded(output, [f32::NAN; 4])[0].is_nan(), "{output:?}");
+            assert!(
+                encoded(displayed(output, [f32::NAN; 4]))[0].is_nan(),
+                "{output:?}"
+            );
         }
         assert_eq!(shows(linear(1.0, ToneMapping::Aces), f32::MAX), 1.0);
         assert_eq!(shows(linear(f32::MAX, ToneMapping::None), f32::MAX), 1.0);

@@ -141,7 +141,7 @@ impl ErrorFigures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::error::{Reference, Tally};
+    use crate::search::error::{BACKGROUNDS, Reference, ReferencePixel, Tally};
 
     /// What a picture of 4 x 4 pixels shows; `None` is background.
     type Colours = [Option<[f32; 3]>; 16];
@@ -150,7 +150,8 @@ mod tests {
     fn reference(pixel: impl Fn(usize) -> (f32, f32)) -> Reference {
         Reference::new((0..16).map(|i| {
             let (grey, coverage) = pixel(i);
-            ([i as u32 % 4, i as u32 / 4], [grey; 3], coverage)
+            let shown = ReferencePixel::new([grey; 3], [1.0 - coverage; 3]);
+            ([i as u32 % 4, i as u32 / 4], shown, coverage)
         }))
     }
 
@@ -161,7 +162,8 @@ mod tests {
     fn frame(reference: &Reference, drawings: &[Colours]) -> FrameError {
         let mut tally = Tally::new(reference);
         for drawing in drawings {
-            tally.add(drawing);
+            let shown = drawing.map(|colour| colour.map_or(BACKGROUNDS, |colour| [colour; 2]));
+            tally.add(&shown);
         }
         tally.finish()
     }
@@ -273,7 +275,13 @@ mod tests {
     #[test]
     fn tiles_of_eight_by_eight_pixels_are_apart() {
         // Four times four pixels at (6, 0) reach into two tiles; the right half of them is wrong.
-        let white = Reference::new((0..16).map(|i| ([6 + i % 4, i / 4], [1.0; 3], 1.0)));
+        let white = Reference::new((0..16).map(|i| {
+            (
+                [6 + i % 4, i / 4],
+                ReferencePixel::new([1.0; 3], [0.0; 3]),
+                1.0,
+            )
+        }));
         let level: Colours = std::array::from_fn(|i| if i % 4 < 2 { WHITE } else { BLACK });
         let frame = frame(&white, &[level]);
         // 8 pixels of a tile count as 16.

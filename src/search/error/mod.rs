@@ -20,10 +20,10 @@ mod held_out;
 mod pixel;
 mod tally;
 
-pub(crate) use display::{displayed, encoded};
+pub(crate) use display::{displayed, encoded, held, through};
 pub use figures::{Details, ErrorFigures};
 pub use held_out::HeldOut;
 pub(crate) use held_out::exceeds;
-pub(crate) use pixel::ReferencePixel;
+pub(crate) use pixel::{BACKGROUNDS, ReferencePixel, Shown};
 pub use tally::ErrorSum;
 pub(crate) use tally::{FrameError, Reference, TILE, Tally};

@@ -1,7 +1,7 @@
 //! One frame's differences added up: over all pixels, by tile, and from offset to offset.
 
-use super::ReferencePixel;
 use super::flip::{flip, reach};
+use super::{BACKGROUNDS, ReferencePixel, Shown};
 use std::collections::BTreeMap;
 
 /// Edge of a tile in pixels.
@@ -55,13 +55,13 @@ pub(crate) struct Reference {
 }
 
 impl Reference {
-    /// From each pixel's place, the mean of its samples' displayed colours, premultiplied, and its covered share.
-    pub(crate) fn new(pixels: impl IntoIterator<Item = ([u32; 2], [f32; 3], f32)>) -> Self {
+    /// From each pixel's place, what it shows, and its covered share: that of its samples that show something.
+    pub(crate) fn new(pixels: impl IntoIterator<Item = ([u32; 2], ReferencePixel, f32)>) -> Self {
         let mut reference = Self::default();
         let mut found = BTreeMap::new();
         let mut places = Vec::new();
-        for ([x, y], mean, coverage) in pixels {
-            reference.pixels.push(ReferencePixel::new(mean, coverage));
+        for ([x, y], pixel, coverage) in pixels {
+            reference.pixels.push(pixel);
             reference.places.push([x, y]);
             reference.coverage += f64::from(coverage);
             let tile = (y / TILE, x / TILE);
@@ -76,11 +76,7 @@ impl Reference {
 
     /// The sum of FLIP over its pixels that it or the drawing covers, the mean over a black and a white
     /// background, and how many those are.
-    pub(crate) fn flip(
-        &self,
-        colours: &[Option<[f32; 3]>],
-        pixels_per_degree: f64,
-    ) -> (f64, usize) {
+    pub(crate) fn flip(&self, colours: &[Shown], pixels_per_degree: f64) -> (f64, usize) {
         let bounds = |axis: usize| {
             let along = self.places.iter().map(|place| place[axis]);
             Some((along.clone().min()?, along.max()?))
@@ -96,11 +92,11 @@ impl Reference {
             (y - top) as usize * width + (x - left) as usize + margin * (width + 1)
         };
         let mut sum = 0.0;
-        for (background, empty) in [0.0, 1.0].into_iter().enumerate() {
-            let mut pictures = [(); 2].map(|()| vec![[empty; 3]; width * height]);
+        for (background, empty) in BACKGROUNDS.into_iter().enumerate() {
+            let mut pictures = [(); 2].map(|()| vec![empty; width * height]);
             for ((place, pixel), colour) in self.places.iter().zip(&self.pixels).zip(colours) {
                 pictures[0][at(*place)] = pixel.over()[background];
-                pictures[1][at(*place)] = colour.unwrap_or([empty; 3]);
+                pictures[1][at(*place)] = colour[background];
             }
             let map = flip(width, &pictures[0], &pictures[1], pixels_per_degree);
             sum += self.places.iter().map(|place| map[at(*place)]).sum::<f64>() / 2.0;
@@ -109,10 +105,10 @@ impl Reference {
     }
 
     /// For each pixel, what is drawn less the reference, as [`ReferencePixel::difference`] has it.
-    pub(crate) fn differences(&self, colours: &[Option<[f32; 3]>]) -> Vec<[f32; 6]> {
+    pub(crate) fn differences(&self, colours: &[Shown]) -> Vec<[f32; 6]> {
         let pixels = self.pixels.iter().zip(colours);
         pixels
-            .map(|(pixel, colour)| pixel.difference(*colour))
+            .map(|(pixel, colour)| pixel.difference(colour))
             .collect()
     }
 
@@ -158,15 +154,15 @@ impl<'a> Tally<'a> {
         }
     }
 
-    /// Adds a drawing: for each pixel of the reference its encoded colour, `None` where it is not covered.
-    pub(crate) fn add(&mut self, colours: &[Option<[f32; 3]>]) {
+    /// Adds a drawing: for each pixel of the reference what it shows.
+    pub(crate) fn add(&mut self, colours: &[Shown]) {
         self.drawings += 1;
         let totals = self.squares.iter_mut().zip(&mut self.sums);
         for ((pixel, colour), (square, sums)) in
             self.reference.pixels.iter().zip(colours).zip(totals)
         {
             let mut six = 0.0;
-            for (difference, sum) in pixel.difference(*colour).into_iter().zip(sums) {
+            for (difference, sum) in pixel.difference(colour).into_iter().zip(sums) {
                 let difference64 = f64::from(difference);
                 six += difference64 * difference64;
                 *sum += difference64;
