@@ -18,6 +18,7 @@ pub mod normalize;
 pub mod op_removal;
 pub mod operands;
 mod places;
+pub mod rate;
 pub mod recipe;
 pub mod semantics;
 pub mod shader;
@@ -27,6 +28,7 @@ pub use cost::Work;
 pub use edit::{Edit, New};
 pub use facts::Facts;
 pub use normalize::{NormalizeError, normalize};
+pub use rate::{Rate, Rates};
 pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
