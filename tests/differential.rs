@@ -11,9 +11,10 @@ use lodc::eval::raster::rasterize;
 use lodc::front::Source;
 use lodc::scene::Scene;
 use lodc::search::{SampleSet, Samples, Stand};
-use lodc_passes::{Shader, Stage};
+use lodc_passes::{Rate, Rates, Shader, Stage, operands};
 use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
-use naga::{Module, ShaderStage};
+use naga::{Expression, Handle, Module, ShaderStage, Statement};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The materials, copied beside their textures with scenes of fewer pixels and levels, so that a search is quick.
@@ -156,6 +157,62 @@ fn normal_form_draws_what_the_source_draws() {
         };
         assert_same(&source.name, &scene, &written, &normal);
     }
+}
+
+/// The values that a fragment stage computes once: outside of its loops.
+fn computed_once(shader: &Shader) -> BTreeSet<Handle<Expression>> {
+    let function = shader.function(Stage::Fragment).expect("it has the stage");
+    let (mut all, mut in_loops) = (BTreeSet::new(), BTreeSet::new());
+    operands::walk(&function.body, &mut |statement| match statement {
+        Statement::Emit(range) => all.extend(range.clone()),
+        Statement::Loop { .. } => {
+            for block in operands::blocks(statement) {
+                operands::walk(block, &mut |inside| {
+                    if let Statement::Emit(range) = inside {
+                        in_loops.extend(range.clone());
+                    }
+                });
+            }
+        }
+        _ => {}
+    });
+    all.retain(|value| !in_loops.contains(value));
+    all
+}
+
+#[test]
+fn what_is_computed_once_a_draw_is_the_same_in_all_its_fragments() {
+    let mut values = 0;
+    for path in fixtures::complete() {
+        let (source, scene) = read(&path);
+        let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+        let rates = Rates::of(&base, Stage::Fragment).expect("a shader has a fragment stage");
+        let uniform: Vec<_> = computed_once(&base)
+            .into_iter()
+            .filter(|value| rates.exactly(*value) <= Rate::Draw)
+            .collect();
+        let entry = base.index(Stage::Fragment).expect("it has the stage");
+        let probed = Program::compile(base.module(), entry, &uniform)
+            .unwrap_or_else(|r| panic!("{}", r.what));
+        let vertex = program(&base, Stage::Vertex);
+        let vertex = vertex.unwrap_or_else(|| programs(&source, &scene).0);
+        for frame in scene.frames(scene.distances[0]).into_iter().take(2) {
+            if frame.mesh.draws().len() > 1 {
+                continue;
+            }
+            let coverage = rasterize(&vertex, &probed, &frame);
+            let profile = shade(&probed, &coverage, &frame.bindings).profile;
+            for (value, components) in uniform.iter().zip(&profile.probes) {
+                for seen in components.iter().filter(|seen| seen.count > 0) {
+                    let id = base.id(Stage::Fragment, *value);
+                    let same = seen.min == seen.max || seen.min.is_nan();
+                    assert!(same, "{}: {id}: {seen:?}", source.name);
+                    values += 1;
+                }
+            }
+        }
+    }
+    assert!(values > 100, "{values} values are not enough to tell");
 }
 
 /// The emitted shader as a host runs it, with `autoLOD` set, or not.

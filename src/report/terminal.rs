@@ -4,7 +4,8 @@ use super::{Report, place_of};
 use crate::emit::Form;
 use crate::front::{Place, Source};
 use crate::search::Measured;
-use lodc_passes::{Candidate, Facts, Shader, texture_removal};
+use lodc_passes::{Candidate, Facts, Rates, Shader, Stage, texture_removal};
+use naga::{Expression, Handle};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -133,28 +134,41 @@ pub fn inspection(
     facts: &Facts,
     tried: &[(Candidate, Option<Measured>)],
 ) -> String {
-    /// What is known of a site: how many candidates each pass has, and the best one.
+    /// What is known of a site: its rates, how many candidates each pass has, and the best one.
     #[derive(Default)]
     struct Site<'a> {
+        /// The rate that it has, and the one that it could have.
+        rates: [String; 2],
         passes: BTreeMap<&'a str, usize>,
         /// Where a texture's mean could take its place: the standard deviation of its texels, of the worst channel.
         deviation: Option<f32>,
         /// Saved share of the cost, added error, and the change.
         best: Option<(f64, f64, &'a Candidate)>,
     }
+    let stages = [Stage::Vertex, Stage::Fragment].map(|stage| (stage, Rates::of(shader, stage)));
+    let rates_at = |(stage, value): (Stage, Handle<Expression>)| {
+        // A texture's variable is a site, and no value.
+        if let Expression::GlobalVariable(_) = shader.function(stage)?.expressions[value] {
+            return None;
+        }
+        let (_, rates) = stages.iter().find(|(of, _)| *of == stage)?;
+        let rates = rates.as_ref()?;
+        let line = |at| place_of(shader, source, (stage, at)).map(|place| line_of(&place));
+        Some([rates.now().to_string(), cheaper(rates, value, &line)])
+    };
     let mut sites: BTreeMap<(usize, u32, &str), (String, Site<'_>)> = BTreeMap::new();
     for (candidate, measured) in tried {
-        let place = shader
-            .find(&candidate.site)
-            .and_then(|at| place_of(shader, source, at));
+        let found = shader.find(&candidate.site);
+        let place = found.and_then(|at| place_of(shader, source, at));
         let (file, line) = place.as_ref().map_or((0, 0), |p| (p.file.start, p.line()));
         let (_, site) = sites
             .entry((file, line, candidate.site.path()))
             .or_insert_with(|| {
-                (
-                    place.as_ref().map_or_else(String::new, line_of),
-                    Site::default(),
-                )
+                let site = Site {
+                    rates: found.and_then(rates_at).unwrap_or_default(),
+                    ..Site::default()
+                };
+                (place.as_ref().map_or_else(String::new, line_of), site)
             });
         *site.passes.entry(&candidate.pass).or_default() += 1;
         if let Some(deviation) = texture_removal::deviation(shader, facts, candidate) {
@@ -175,8 +189,19 @@ pub fn inspection(
             site.best = Some((saved, added, candidate));
         }
     }
-    let mut rows =
-        vec![["line", "value", "candidates", "saves", "excess", "by"].map(str::to_owned)];
+    let mut rows = vec![
+        [
+            "line",
+            "value",
+            "rate",
+            "could be",
+            "candidates",
+            "saves",
+            "excess",
+            "by",
+        ]
+        .map(str::to_owned),
+    ];
     for ((_, _, value), (line, site)) in sites {
         let deviation = site.deviation.map(|d| format!("texels +- {d:.2}"));
         let passes: Vec<String> = site
@@ -199,10 +224,42 @@ pub fn inspection(
             ),
             None => ("-".to_owned(), "-".to_owned(), String::new()),
         };
-        rows.push([line, value.to_owned(), passes.join(", "), saves, excess, by]);
+        let [now, could_be] = site.rates;
+        let value = value.to_owned();
+        rows.push([
+            line,
+            value,
+            now,
+            could_be,
+            passes.join(", "),
+            saves,
+            excess,
+            by,
+        ]);
     }
-    let table = columns(&rows, &[false, true, true, false, false, true]);
+    let left = [false, true, true, true, true, false, false, true];
+    let table = columns(&rows, &left);
     format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n")
+}
+
+/// The cheaper rates that a value could have, or what keeps it where it is.
+fn cheaper(
+    rates: &Rates,
+    value: Handle<Expression>,
+    line: &dyn Fn(Handle<Expression>) -> Option<String>,
+) -> String {
+    let (exactly, approximately) = (rates.exactly(value), rates.approximately(value));
+    if exactly < rates.now() && exactly <= approximately {
+        return format!("{exactly}, exactly");
+    }
+    if approximately < rates.now() {
+        return format!("{approximately}, approximately");
+    }
+    let stop = rates.stop(value);
+    stop.map_or_else(String::new, |stop| match line(stop.value) {
+        Some(line) => format!("stops at {} in line {line}", stop.why),
+        None => format!("stops at {}", stop.why),
+    })
 }
 
 /// A line of the shader's own file as its number, one of another file with that file's name.
