@@ -11,7 +11,7 @@ mod init;
 mod search;
 
 #[cfg(feature = "search")]
-pub use compare::{CompareRequest, Compared, compare};
+pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
 #[cfg(feature = "search")]

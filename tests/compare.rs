@@ -37,7 +37,7 @@ fn request(folder: &Path) -> CompareRequest {
 
 fn compared(name: &str, a: &str, b: &str, scene: &str) -> Result<Compared> {
     let folder = folder(name, &[("a.wgsl", a), ("b.wgsl", b), ("a.toml", scene)]);
-    compare(&request(&folder))
+    compare(&request(&folder), &|| {})
 }
 
 fn close(found: f64, by_hand: f64) {
@@ -98,32 +98,42 @@ fn errors_worked_out_by_hand() {
     close(found.comparison.distances[0].error.rmse, 0.5_f64.sqrt());
 }
 
-#[test]
-fn a_shader_is_within_its_own_bound_everywhere() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/gbuffer.wgsl");
-    let text = fs::read_to_string(path.with_extension("toml")).expect("the scene is there");
-    let lines = text
-        .lines()
-        .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
-    let lines: Vec<&str> = ["resolution = [24, 24]", "levels = 3"]
-        .into_iter()
-        .chain(lines)
-        .collect();
-    let folder = folder("same", &[]);
+/// A material of the repository as `a.wgsl` in a folder of its own, with these lines at the head of its scene instead of
+/// its resolution and its number of distances.
+fn small(name: &str, material: &str, head: &str) -> PathBuf {
+    let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+    let folder = folder(name, &[]);
     for inside in ["textures", "lighting"] {
-        fs::create_dir_all(folder.join(inside)).unwrap();
-        for entry in fs::read_dir(path.with_file_name(inside)).unwrap() {
-            let entry = entry.unwrap();
-            fs::copy(entry.path(), folder.join(inside).join(entry.file_name())).unwrap();
+        fs::create_dir_all(folder.join(inside)).expect("it can be written");
+        for entry in fs::read_dir(materials.join(inside)).expect("the folder is there") {
+            let entry = entry.expect("it can be listed");
+            let copy = folder.join(inside).join(entry.file_name());
+            fs::copy(entry.path(), copy).expect("it can be copied");
         }
     }
-    fs::write(folder.join("a.toml"), lines.join("\n")).unwrap();
-    fs::copy(&path, folder.join("a.wgsl")).unwrap();
-    fs::copy(&path, folder.join("b.wgsl")).unwrap();
-    let found = compare(&CompareRequest {
-        images: Some(folder.join("pictures")),
-        ..request(&folder)
-    })
+    let scene = materials.join(material).with_extension("toml");
+    let scene = fs::read_to_string(scene).expect("a scene is text");
+    let kept = scene
+        .lines()
+        .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
+    let lines: Vec<&str> = head.lines().chain(kept).collect();
+    fs::write(folder.join("a.toml"), lines.join("\n")).expect("it can be written");
+    let shader = materials.join(material).with_extension("wgsl");
+    fs::copy(shader, folder.join("a.wgsl")).expect("it can be copied");
+    folder
+}
+
+#[test]
+fn a_shader_is_within_its_own_bound_everywhere() {
+    let folder = small("same", "gbuffer", "resolution = [24, 24]\nlevels = 3");
+    fs::copy(folder.join("a.wgsl"), folder.join("b.wgsl")).unwrap();
+    let found = compare(
+        &CompareRequest {
+            images: Some(folder.join("pictures")),
+            ..request(&folder)
+        },
+        &|| {},
+    )
     .unwrap();
     assert_eq!(found.comparison.distances.len(), 3);
     for at in &found.comparison.distances {
@@ -131,7 +141,7 @@ fn a_shader_is_within_its_own_bound_everywhere() {
         assert!(at.within && error.rmse > 0.0, "{at:?}");
         assert_eq!(
             (error.rmse, error.excess, at.ratio),
-            (error.floor, 0.0, 1.0)
+            (error.floor, 0.0, Some(1.0))
         );
     }
     // A deferred scene's pictures are lit, and those of one shader do not differ.
@@ -179,7 +189,7 @@ fn an_emitted_shader_draws_the_level_that_is_asked_for() {
                 autolod,
                 ..request(&folder)
             };
-            let found = compare(&request).unwrap().comparison.distances;
+            let found = compare(&request, &|| {}).unwrap().comparison.distances;
             assert_eq!(found.len(), at.len().max(1), "{way}");
             (
                 found[0].error.rmse,
@@ -203,27 +213,11 @@ fn an_emitted_shader_draws_the_level_that_is_asked_for() {
 
 #[test]
 fn emitted_forms_have_the_errors_of_their_report() {
-    let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
-    let folder = folder("report", &[]);
-    fs::create_dir_all(folder.join("textures")).unwrap();
-    for entry in fs::read_dir(materials.join("textures")).unwrap() {
-        let entry = entry.unwrap();
-        fs::copy(
-            entry.path(),
-            folder.join("textures").join(entry.file_name()),
-        )
-        .unwrap();
-    }
-    let text = fs::read_to_string(materials.join("terrain_blend.toml")).unwrap();
-    let lines = text
-        .lines()
-        .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
-    let lines: Vec<&str> = ["resolution = [48, 48]", "levels = 3"]
-        .into_iter()
-        .chain(lines)
-        .collect();
-    fs::write(folder.join("a.toml"), lines.join("\n")).unwrap();
-    fs::copy(materials.join("terrain_blend.wgsl"), folder.join("a.wgsl")).unwrap();
+    let folder = small(
+        "report",
+        "terrain_blend",
+        "resolution = [48, 48]\nlevels = 3",
+    );
     let original = Request {
         shader: folder.join("a.wgsl"),
         ..Request::default()
@@ -239,10 +233,13 @@ fn emitted_forms_have_the_errors_of_their_report() {
     write_atomically(&compile::locked(&of_uniform).unwrap().0).unwrap();
     assert!(made.report.levels.len() > 1);
     for other in ["a.lod.wgsl", "uniform.lod.wgsl"] {
-        let found = compare(&CompareRequest {
-            other: folder.join(other),
-            ..request(&folder)
-        })
+        let found = compare(
+            &CompareRequest {
+                other: folder.join(other),
+                ..request(&folder)
+            },
+            &|| {},
+        )
         .unwrap();
         assert!(
             found.comparison.failed().is_none(),
@@ -322,10 +319,13 @@ fn a_vertex_file_is_for_shaders_without_a_vertex_stage() {
     ];
     let folder = folder("vertex", &files);
     for other in ["b.wgsl", "whole.wgsl"] {
-        let found = compare(&CompareRequest {
-            other: folder.join(other),
-            ..request(&folder)
-        })
+        let found = compare(
+            &CompareRequest {
+                other: folder.join(other),
+                ..request(&folder)
+            },
+            &|| {},
+        )
         .unwrap();
         assert_eq!(found.comparison.distances[0].error.rmse, 0.0, "{other}");
     }
@@ -344,7 +344,7 @@ fn pictures_show_both_and_four_times_the_difference() {
         images: Some(folder.join("out")),
         ..request(&folder)
     };
-    let found = compare(&request).unwrap();
+    let found = compare(&request, &|| {}).unwrap();
     write_atomically(&found.files).unwrap();
     let names: Vec<_> = found
         .files
@@ -416,4 +416,177 @@ fn a_check_that_fails_exits_with_1() {
             .as_f64()
             .is_some_and(|e| (e - 0.25).abs() < 1e-6)
     );
+}
+
+#[cfg(feature = "gpu")]
+mod on_a_gpu {
+    use super::*;
+    use lodc::compile::DrawnBy;
+    use lodc::gpu::Gpu;
+
+    /// Whether there is an adapter. Where tests must not be skipped, there is.
+    fn has_adapter() -> bool {
+        match Gpu::open(None) {
+            Ok(_) => true,
+            Err(error) if std::env::var_os("CI").is_some() => panic!("{error}"),
+            Err(error) => {
+                eprintln!("SKIPPED: comparisons on a GPU: {error}");
+                false
+            }
+        }
+    }
+
+    /// A material of the repository in a folder of its own, with a scene of fewer pixels and distances, and as `b.wgsl`
+    /// the same with some words replaced.
+    fn altered(material: &str, changes: &[(&str, &str)]) -> PathBuf {
+        let folder = small(
+            &format!("gpu_{material}"),
+            material,
+            "resolution = [40, 40]\nlevels = 3\n",
+        );
+        let text = fs::read_to_string(folder.join("a.wgsl")).unwrap();
+        let other = changes.iter().fold(text, |text, (from, to)| {
+            assert!(text.contains(from), "{material} has no `{from}`");
+            text.replace(from, to)
+        });
+        fs::write(folder.join("b.wgsl"), other).unwrap();
+        folder
+    }
+
+    #[test]
+    fn errors_by_gpu_are_those_of_the_evaluator() {
+        if !has_adapter() {
+            return;
+        }
+        for (material, changes) in MATERIALS {
+            let folder = altered(material, changes);
+            let by = |renderer| {
+                let request = CompareRequest {
+                    renderer,
+                    ..request(&folder)
+                };
+                compare(&request, &|| {}).unwrap().comparison
+            };
+            let (cpu, gpu) = (by(DrawnBy::Evaluator), by(DrawnBy::Gpu { adapter: None }));
+            let label = gpu.adapter.expect("it says what drew");
+            assert_eq!(cpu.distances.len(), gpu.distances.len());
+            for (cpu, gpu) in cpu.distances.iter().zip(&gpu.distances) {
+                let (at, gpu_within) = (cpu.distance, gpu.within);
+                let (cpu_within, cpu, gpu) = (cpu.within, &cpu.error, &gpu.error);
+                for (what, cpu, gpu) in [
+                    ("error", cpu.rmse, gpu.rmse),
+                    ("floor", cpu.floor, gpu.floor),
+                    ("excess", cpu.excess, gpu.excess),
+                    ("worst view", cpu.worst_view, gpu.worst_view),
+                    ("worst tile", cpu.worst_tile, gpu.worst_tile),
+                    ("shimmer", cpu.shimmer, gpu.shimmer),
+                    ("FLIP", cpu.flip, gpu.flip),
+                ] {
+                    println!(
+                        "{material} at {at:.2}, {label}: {what} {cpu:.5} by evaluator, {gpu:.5} by GPU"
+                    );
+                    let close = (cpu - gpu).abs() <= (0.05 * cpu).max(0.001);
+                    assert!(
+                        close,
+                        "{material} at {at}: {what} {cpu} by evaluator, {gpu} by {label}"
+                    );
+                }
+                assert_eq!(cpu_within, gpu_within);
+            }
+        }
+    }
+
+    /// A forward material, and a deferred one.
+    const MATERIALS: [(&str, &[(&str, &str)]); 2] = [
+        (
+            "terrain_blend",
+            &[
+                ("in.uv * 1.7 + 0.31)", "vec2f(0.31))"),
+                ("let wet = mask.b;", "let wet = 0.4;"),
+            ],
+        ),
+        (
+            "gbuffer",
+            &[(
+                "textureSample(panel_normal, panel_sampler, in.uv).xy * 2.0 - 1.0",
+                "vec2f(0.0)",
+            )],
+        ),
+    ];
+
+    #[test]
+    fn blended_surfaces_are_refused_on_a_gpu() {
+        if !has_adapter() {
+            return;
+        }
+        let folder = small(
+            "blended",
+            "terrain_blend",
+            "resolution = [8, 8]\nlevels = 2\nblend = \"alpha\"",
+        );
+        let request = CompareRequest {
+            other: folder.join("a.wgsl"),
+            renderer: DrawnBy::Gpu { adapter: None },
+            ..request(&folder)
+        };
+        let error = compare(&request, &|| {}).unwrap_err();
+        assert!(
+            error.message.contains("blended") && !error.notes.is_empty(),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_comparison_on_a_gpu_has_a_process_of_its_own() {
+        if !has_adapter() {
+            return;
+        }
+        let files = [
+            ("a.wgsl", &*screen(&grey("0.5"), "1.0")),
+            ("b.wgsl", &*screen(&grey("0.75"), "1.0")),
+            ("a.toml", ENCODED),
+        ];
+        let folder = folder("process", &files);
+        let run = |arguments: &[&str]| {
+            let command = std::process::Command::new(env!("CARGO_BIN_EXE_lodc"))
+                .args(["compare", "a.wgsl", "b.wgsl"])
+                .args(arguments)
+                .current_dir(&folder)
+                .output();
+            let output = command.expect("lodc starts");
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            (
+                output.status.code(),
+                text(&output.stdout),
+                text(&output.stderr),
+            )
+        };
+        let (code, out, err) = run(&["--renderer", "gpu", "--json", "-o", "out"]);
+        assert!(code == Some(0), "{code:?} {err}");
+        let json: serde_json::Value = serde_json::from_str(&out).expect("it is JSON");
+        assert_eq!(json["renderer"], "gpu");
+        assert!(json["adapter"].is_string());
+        let excess = json["distances"][0]["error"]["excess"].as_f64().unwrap();
+        assert!((excess - 0.25).abs() < 1e-5, "{excess}");
+        // Nothing is covered by halves here, so that the pictures are those of the evaluator.
+        for picture in fs::read_dir(folder.join("out")).unwrap() {
+            let image = read_png(&picture.unwrap().path(), Space::Integer).unwrap();
+            assert_eq!((image.width, image.height), (16, 16));
+            assert!(
+                image.texels.iter().all(|texel| texel[0] >= 127.0),
+                "{:?}",
+                image.texels[0]
+            );
+        }
+        let (code, out, err) = run(&["--renderer", "gpu", "--check"]);
+        assert!(
+            code == Some(1) && out.contains("drawn by"),
+            "{code:?} {out} {err}"
+        );
+        let (code, _, err) = run(&["--adapter", "Voodoo 2"]);
+        assert!(
+            code == Some(2) && err.contains("there is no adapter `Voodoo 2`"),
+            "{code:?} {err}"
+        );
+    }
 }

@@ -1,8 +1,10 @@
 //! The command line: arguments in, messages and an exit code out. All work is the library's.
 
+#[cfg(feature = "gpu")]
+mod child;
 mod progress;
 
-use crate::compile::{self, CompareRequest, InitRequest, Request};
+use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request};
 use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
@@ -80,6 +82,44 @@ struct CompareArgs {
     /// Prints the comparison as JSON
     #[arg(long)]
     json: bool,
+    #[cfg(feature = "gpu")]
+    #[command(flatten)]
+    drawn_by: DrawnByArgs,
+}
+
+/// What draws pictures.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Args)]
+struct DrawnByArgs {
+    /// What draws the pictures [default: gpu with --adapter, else evaluator]
+    #[arg(long, value_enum)]
+    renderer: Option<Renderer>,
+    /// The GPU that draws: words of its name [default: the best]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+#[cfg(feature = "gpu")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Renderer {
+    /// On the CPU, the same everywhere
+    Evaluator,
+    /// With wgpu, in a process of its own
+    Gpu,
+}
+
+#[cfg(feature = "gpu")]
+impl DrawnByArgs {
+    fn drawn_by(self) -> Result<DrawnBy> {
+        match (self.renderer, self.adapter) {
+            (Some(Renderer::Evaluator), Some(_)) => Err(Diagnostic::error(
+                "`--adapter` names a GPU, and the evaluator draws without one",
+            )
+            .with_note("leave one of `--adapter` and `--renderer evaluator` out")),
+            (None | Some(Renderer::Evaluator), None) => Ok(DrawnBy::Evaluator),
+            (_, adapter) => Ok(DrawnBy::Gpu { adapter }),
+        }
+    }
 }
 
 /// What the commands read that look at a shader in its scene.
@@ -142,7 +182,8 @@ struct CompileArgs {
 
 /// Runs the tool. Exit code 0: done; 1: a check failed; 2: bad input or usage.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
             let _ = error.print();
@@ -152,12 +193,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match cli.command {
         Some(Command::Inspect(input)) => inspect(input),
         Some(Command::Init(arguments)) => init(arguments),
-        Some(Command::Compare(arguments)) => match compare(arguments) {
-            Ok(Some(failed)) => {
-                print_diagnostic(&failed);
-                return ExitCode::from(1);
-            }
-            Ok(None) => Ok(()),
+        Some(Command::Compare(compared)) => match compare(compared, &arguments) {
+            Ok(code) => return code,
             Err(error) => Err(error),
         },
         None => compile_command(cli.compile),
@@ -260,8 +297,9 @@ fn command_line() -> String {
         .join(" ")
 }
 
-/// Compares two shaders; what is wrong with the second, when that is asked for.
-fn compare(arguments: CompareArgs) -> Result<Option<Box<Diagnostic>>> {
+/// Compares two shaders. Exit code 1 when the second is over its bound, and that was asked for. `all` are the arguments
+/// of the process.
+fn compare(arguments: CompareArgs, all: &[OsString]) -> Result<ExitCode> {
     let request = CompareRequest {
         original: Request {
             bound: arguments.bound,
@@ -273,8 +311,22 @@ fn compare(arguments: CompareArgs) -> Result<Option<Box<Diagnostic>>> {
         at: arguments.at,
         autolod: arguments.autolod,
         images: arguments.output,
+        #[cfg(feature = "gpu")]
+        renderer: arguments.drawn_by.drawn_by()?,
+        #[cfg(not(feature = "gpu"))]
+        renderer: DrawnBy::Evaluator,
     };
-    let compared = compile::compare(&request)?;
+    #[cfg(feature = "gpu")]
+    if let DrawnBy::Gpu { adapter } = &request.renderer
+        && !child::is_one()
+    {
+        return child::run(all, adapter.as_deref());
+    }
+    #[cfg(feature = "gpu")]
+    let goes_on = child::goes_on;
+    #[cfg(not(feature = "gpu"))]
+    let (goes_on, _) = (|| {}, all);
+    let compared = compile::compare(&request, &goes_on)?;
     for warning in &compared.warnings {
         print_diagnostic(warning);
     }
@@ -289,7 +341,13 @@ fn compare(arguments: CompareArgs) -> Result<Option<Box<Diagnostic>>> {
             print(&format!("  {:<16}{count} pictures to {folder}\n", "wrote"));
         }
     }
-    Ok(arguments.check.then(|| comparison.failed()).flatten())
+    Ok(match comparison.failed() {
+        Some(failed) if arguments.check => {
+            print_diagnostic(&failed);
+            ExitCode::from(1)
+        }
+        _ => ExitCode::SUCCESS,
+    })
 }
 
 fn compile_command(arguments: CompileArgs) -> Result<()> {

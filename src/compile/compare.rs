@@ -7,12 +7,17 @@ use super::search::{Read, Ready, vertex_program};
 use super::{Files, Request, normal_form};
 use crate::emit::{figure, writable};
 use crate::eval::image::{encode_png, to_byte};
+use crate::eval::program::{Program, Refused};
 use crate::front::Source;
+#[cfg(feature = "gpu")]
+use crate::gpu::{Gpu, Stages};
 use crate::report::{ComparedAt, Comparison, Input};
 use crate::scene::Scene;
-use crate::search::{SampleSet, Shown, Stand, threshold};
+#[cfg(feature = "gpu")]
+use crate::search::drawn::{Compiled, Device};
+use crate::search::{ErrorFigures, OverBlack, SampleSet, Stand, threshold};
 use crate::{Diagnostic, Result};
-use lodc_passes::autolod;
+use lodc_passes::{Work, autolod};
 use naga::back::pipeline_constants::process_overrides;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,6 +36,22 @@ pub struct CompareRequest {
     pub autolod: Option<f64>,
     /// The folder that pictures are written to.
     pub images: Option<PathBuf>,
+    /// What draws.
+    pub renderer: DrawnBy,
+}
+
+/// What draws the pictures that are compared.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DrawnBy {
+    /// The evaluator, on the CPU.
+    #[default]
+    Evaluator,
+    /// The best GPU, or the one that a part of its name is given of.
+    #[cfg(feature = "gpu")]
+    Gpu {
+        /// Words of the adapter's label.
+        adapter: Option<String>,
+    },
 }
 
 /// What a comparison gives.
@@ -50,12 +71,12 @@ const GAIN: u8 = 4;
 /// The name that emitted shaders give to what they choose a level by.
 const AUTO_LOD: &str = "autoLOD";
 
-/// Compares two shaders.
+/// Compares two shaders. `goes_on` is called whenever another picture has been drawn, or several.
 ///
 /// # Errors
 /// When an input cannot be read or is wrong, at its place; when the shaders do not fit one scene; when a distance or a
-/// level of detail is none.
-pub fn compare(request: &CompareRequest) -> Result<Compared> {
+/// level of detail is none; when the GPU that is asked for is not there, or cannot draw them.
+pub fn compare(request: &CompareRequest, goes_on: &dyn Fn()) -> Result<Compared> {
     let (a, mut b) = read(request)?;
     let vertex = a.vertex()?;
     a.ends(&vertex)?;
@@ -64,54 +85,164 @@ pub fn compare(request: &CompareRequest) -> Result<Compared> {
         // What cannot be written should be known before pictures are drawn.
         writable(&[(folder.join("a.png"), Vec::new())])?;
     }
-    let original = Stand {
-        base: &a.base,
-        vertex: &vertex,
-        scene: &a.scene,
-    };
     let chooses = chooses(&b);
     let mut files = Files::new();
     let mut distances = Vec::new();
+    let judge = Judge::evaluator(&a, &vertex);
+    #[cfg(feature = "gpu")]
+    let gpu = match &request.renderer {
+        DrawnBy::Gpu { adapter } => Some(Gpu::open(adapter.as_deref())?),
+        DrawnBy::Evaluator => None,
+    };
+    #[cfg(feature = "gpu")]
+    let judge = match &gpu {
+        Some(gpu) => Judge::gpu(gpu, &a)?,
+        None => judge,
+    };
+    let mut judge = judge;
     for distance in distances_of(request, &a.scene)? {
         // As thresholds are rounded, so that a level is seen where it starts.
         let wanted = request
             .autolod
             .unwrap_or_else(|| threshold(&a.scene, distance));
         b.scene.set_auto_lod(wanted);
-        let source = specialised(&b.source, wanted)?;
-        let base = normal_form(&source)?;
-        let vertex = vertex_program(&b.scene, &base).map_err(|refused| refused.at(&source))?;
-        let other = Stand {
-            base: &base,
-            vertex: &vertex,
-            scene: &b.scene,
-        };
-        // The original has been compiled once; what is refused by now is the other's.
-        let measured = SampleSet::of_two([&original, &other], distance).and_then(|[a, b]| {
-            let at = (distance, chooses.then_some(wanted));
-            let (error, flip) = (b.figures(&base)?, b.flip(&base)?);
-            let pair = [&a.original(), &b.measure(&base)?];
-            let found = ComparedAt::new(at, &error, flip, pair);
-            let pictures = match &request.images {
-                Some(_) => Some([a.pictures(original.base)?, b.pictures(&base)?]),
-                None => None,
-            };
-            Ok((found, pictures))
-        });
-        let (found, pictures) = measured.map_err(|refused| refused.at(&source))?;
-        distances.push(found);
-        if let (Some(folder), Some(pictures)) = (&request.images, pictures) {
+        let other = (&specialised(&b.source, wanted)?, &b.scene);
+        let judged = judge.judge(other, distance, request.images.is_some(), goes_on)?;
+        let at = (distance, chooses.then_some(wanted));
+        let works = judged.works.as_ref();
+        distances.push(ComparedAt::new(at, &judged.error, judged.flip, works));
+        if let (Some(folder), Some(pictures)) = (&request.images, judged.pictures) {
             files.extend(sheets(folder, distance, &pictures)?);
         }
     }
+    let adapter = judge.adapter();
     let inputs: Vec<PathBuf> = a.inputs(&a.request).chain(b.inputs(&b.request)).collect();
     request.original.spare(&files, &inputs)?;
     let warnings = warnings(request, &a.scene, &b.scene, chooses);
     Ok(Compared {
-        comparison: comparison(request, &a, &b, distances, &warnings),
+        comparison: comparison(request, (&a, &b), adapter, distances, &warnings),
         files,
         warnings,
     })
+}
+
+/// What was measured of the other shader at a distance.
+struct Judged {
+    error: ErrorFigures,
+    flip: f64,
+    /// Executed work of a covered fragment of the original and of the other, where it is counted.
+    works: Option<[Work; 2]>,
+    /// Of the original and of the other, when they are wanted.
+    pictures: Option<[Vec<OverBlack>; 2]>,
+}
+
+/// What measures: a renderer with the original.
+enum Judge<'a> {
+    Evaluator {
+        original: Stand<'a>,
+    },
+    #[cfg(feature = "gpu")]
+    Gpu {
+        device: Device<'a>,
+        original: Compiled<'a>,
+    },
+}
+
+impl<'a> Judge<'a> {
+    fn evaluator(a: &'a Ready, vertex: &'a Program) -> Self {
+        Self::Evaluator {
+            original: Stand {
+                base: &a.base,
+                vertex,
+                scene: &a.scene,
+            },
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(gpu: &'a Gpu, a: &'a Ready) -> Result<Self> {
+        let device = Device::new(gpu)?;
+        let original = device.compile(stages(&a.source, &a.scene)?, &a.scene)?;
+        Ok(Self::Gpu { device, original })
+    }
+
+    /// The adapter's label, where there is one.
+    fn adapter(&self) -> Option<String> {
+        match self {
+            Self::Evaluator { .. } => None,
+            #[cfg(feature = "gpu")]
+            Self::Gpu { device, .. } => Some(device.gpu().label().to_string()),
+        }
+    }
+
+    /// Measures a shader in its scene at a distance.
+    fn judge(
+        &mut self,
+        (source, scene): (&Source, &Scene),
+        distance: f64,
+        wants_pictures: bool,
+        goes_on: &dyn Fn(),
+    ) -> Result<Judged> {
+        match self {
+            Self::Evaluator { original } => {
+                let base = normal_form(source)?;
+                let vertex = vertex_program(scene, &base).map_err(|refused| refused.at(source))?;
+                let other = Stand {
+                    base: &base,
+                    vertex: &vertex,
+                    scene,
+                };
+                let judged = evaluated([original, &other], distance, wants_pictures);
+                goes_on();
+                // The original has been compiled once; what is refused by now is the other's.
+                judged.map_err(|refused| refused.at(source))
+            }
+            #[cfg(feature = "gpu")]
+            Self::Gpu { device, original } => {
+                let other = device.compile(stages(source, scene)?, scene)?;
+                let (error, flip) = device.compare([original, &other], distance, goes_on)?;
+                let pictures = match wants_pictures {
+                    true => Some([
+                        device.pictures(original, distance, goes_on)?,
+                        device.pictures(&other, distance, goes_on)?,
+                    ]),
+                    false => None,
+                };
+                Ok(Judged {
+                    error,
+                    flip,
+                    works: None,
+                    pictures,
+                })
+            }
+        }
+    }
+}
+
+/// What the evaluator measures of the second shader.
+fn evaluated(
+    stands: [&Stand<'_>; 2],
+    distance: f64,
+    wants_pictures: bool,
+) -> std::result::Result<Judged, Refused> {
+    let [a, b] = SampleSet::of_two(stands, distance)?;
+    let [original, other] = stands.map(|stand| stand.base);
+    Ok(Judged {
+        error: b.figures(other)?,
+        flip: b.flip(other)?,
+        works: Some([a.original().work, b.measure(other)?.work]),
+        pictures: match wants_pictures {
+            true => Some([a.pictures(original)?, b.pictures(other)?]),
+            false => None,
+        },
+    })
+}
+
+/// The stages that a device draws, as they are written.
+#[cfg(feature = "gpu")]
+fn stages<'s>(source: &'s Source, scene: &'s Scene) -> Result<Stages<'s>> {
+    Stages::of_source(source, scene)
+        .ok_or_else(|| Diagnostic::error(format!("`{}` has no vertex stage", source.name)))
 }
 
 /// Both shaders, each with the scene as it is for that shader.
@@ -205,7 +336,7 @@ fn specialised(source: &Source, autolod: f64) -> Result<Source> {
 }
 
 /// The pictures of a distance as files: for each view the original's, the other's, and their difference.
-fn sheets(folder: &Path, distance: f64, [a, b]: &[Vec<Shown>; 2]) -> Result<Files> {
+fn sheets(folder: &Path, distance: f64, [a, b]: &[Vec<OverBlack>; 2]) -> Result<Files> {
     let mut files = Files::new();
     for (view, (a, b)) in a.iter().zip(b).enumerate() {
         let difference: Vec<[f32; 3]> = a.pixels.iter().zip(&b.pixels).map(apart).collect();
@@ -256,8 +387,8 @@ fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Ve
 
 fn comparison(
     request: &CompareRequest,
-    a: &Ready,
-    b: &Ready,
+    (a, b): (&Ready, &Ready),
+    adapter: Option<String>,
     distances: Vec<ComparedAt>,
     warnings: &[Box<Diagnostic>],
 ) -> Comparison {
@@ -279,7 +410,11 @@ fn comparison(
         original: a.source.name.clone(),
         other: b.source.name.clone(),
         scene: a.scene.name.clone(),
-        renderer: "evaluator",
+        renderer: match adapter {
+            Some(_) => "gpu",
+            None => "evaluator",
+        },
+        adapter,
         seed: a.scene.seed,
         inputs,
         rho0: a.scene.rho0(),

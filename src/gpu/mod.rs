@@ -5,6 +5,7 @@
 //! Module x Module --entry, render--> Pipeline       compiled once for a shader
 //! Pipeline x Frame --resources, render--> Drawn     colour and coverage, in textures on the device
 //! Drawn --read--> Picture                           as the evaluator gives it
+//! Drawn x Drawn --error--> [TileSum]                what differs, added up on the device
 //! ```
 //!
 //! It is the only folder that names wgpu, and it does not know the search. What goes wrong on a device is a
@@ -13,6 +14,7 @@
 
 mod adapter;
 mod entry;
+pub mod error;
 mod read;
 mod render;
 mod resources;

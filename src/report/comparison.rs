@@ -3,7 +3,8 @@
 use super::terminal::columns;
 use super::{CostReport, ErrorReport, Input};
 use crate::Diagnostic;
-use crate::search::{ErrorFigures, Measured};
+use crate::search::ErrorFigures;
+use lodc_passes::Work;
 use serde::Serialize;
 
 /// One shader against another, as data.
@@ -19,8 +20,10 @@ pub struct Comparison {
     pub other: String,
     /// The scene file, when there is one.
     pub scene: Option<String>,
-    /// What drew the pictures: `evaluator`.
+    /// What drew the pictures: `evaluator` or `gpu`.
     pub renderer: &'static str,
+    /// The GPU that drew them.
+    pub adapter: Option<String>,
     /// The seed of everything that is sampled.
     pub seed: u64,
     /// What was read, each with the hash of its bytes.
@@ -50,38 +53,36 @@ pub struct ComparedAt {
     pub error: ErrorReport,
     /// Whether everything that is bounded is within its bound.
     pub within: bool,
-    /// Executed work of a covered fragment of the other shader.
-    pub cost: CostReport,
+    /// Executed work of a covered fragment of the other shader; only the evaluator counts it.
+    pub cost: Option<CostReport>,
     /// That work as a share of the original's: an estimate of the run time.
-    pub ratio: f64,
+    pub ratio: Option<f64>,
 }
 
 impl ComparedAt {
-    /// From what was measured of the other shader against the original.
+    /// From what was measured of the other shader against the original; `works` are of the original and of the other.
     pub(crate) fn new(
         (distance, autolod): (f64, Option<f64>),
         error: &ErrorFigures,
         flip: f64,
-        [original, other]: [&Measured; 2],
+        works: Option<&[Work; 2]>,
     ) -> Self {
-        let total = original.work.total();
         Self {
             distance,
             autolod,
             error: ErrorReport::new(error, flip, None),
             within: error.strain() <= 1.0,
-            cost: CostReport {
-                operations: other.work.operations(),
-                texture_samples: other.work.samples,
+            cost: works.map(|[_, other]| CostReport {
+                operations: other.operations(),
+                texture_samples: other.samples,
                 vertex_operations: 0.0,
                 parameters: 0,
                 texture_bytes: 0,
-            },
-            ratio: if total > 0.0 {
-                other.work.total() / total
-            } else {
-                1.0
-            },
+            }),
+            ratio: works.and_then(|[original, other]| {
+                let total = original.total();
+                (total > 0.0).then(|| other.total() / total)
+            }),
         }
     }
 }
@@ -116,7 +117,11 @@ impl Comparison {
             out += &format!("  {title:<16}{inference}\n");
         }
         out += &format!("  {:<16}{}\n", "original", self.original);
-        out += &format!("  {:<16}{}\n\n", "compared", self.other);
+        out += &format!("  {:<16}{}\n", "compared", self.other);
+        if let Some(adapter) = &self.adapter {
+            out += &format!("  {:<16}{adapter}\n", "drawn by");
+        }
+        out.push('\n');
         let mut rows = vec![
             [
                 "distance", "autoLOD", "error", "floor", "excess", "bound", "view", "tile",
@@ -143,13 +148,16 @@ impl Comparison {
                     .psnr
                     .map_or("-".to_owned(), |psnr| format!("{psnr:.1}")),
                 number(error.flip),
-                format!("{:.2}", at.ratio),
+                at.ratio
+                    .map_or("-".to_owned(), |ratio| format!("{ratio:.2}")),
                 if at.within { "yes" } else { "no" }.to_owned(),
             ]);
         }
         out += &columns(&rows, &[false; 14]);
         out += "  view, tile, shimmer: what the worst view and the worst tile add, and how much more it shimmers than the original\n";
-        out += "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n";
+        if self.adapter.is_none() {
+            out += "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n";
+        }
         out
     }
 }

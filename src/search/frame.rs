@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Fine pixels of the reference to a pixel, along each axis.
-const GRID: u32 = 4;
+pub(super) const GRID: u32 = 4;
 
 /// How much of a frame is looked at.
 #[derive(Clone, Copy, Debug)]

@@ -11,6 +11,8 @@
 
 mod best;
 mod confirm;
+#[cfg(feature = "gpu")]
+pub mod drawn;
 pub mod error;
 mod facts;
 mod frame;
@@ -26,4 +28,4 @@ pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
 pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, find};
-pub use samples::{Measured, SampleSet, Samples, Shown, Stand};
+pub use samples::{Measured, OverBlack, SampleSet, Samples, Stand};

@@ -63,7 +63,7 @@ pub struct Measured {
 
 /// A picture as a display shows it over black, one sample a pixel, at its centre.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
+pub struct OverBlack {
     /// In pixels.
     pub width: u32,
     /// In pixels.
@@ -223,11 +223,11 @@ impl<'a> SampleSet<'a> {
     }
 
     /// A shader's pictures, one for each view, with the first sample of the uniforms, as a display shows them over black
-    /// (see [`Shown`]).
+    /// (see [`OverBlack`]).
     ///
     /// # Errors
     /// When the evaluator refuses it.
-    pub fn pictures(&self, shader: &Shader) -> Result<Vec<Shown>, Refused> {
+    pub fn pictures(&self, shader: &Shader) -> Result<Vec<OverBlack>, Refused> {
         let scene = self.stand.scene;
         let fragment = compile(shader, &[])?;
         let pen = Pen {
@@ -237,7 +237,7 @@ impl<'a> SampleSet<'a> {
         };
         let frames = scene.frames(self.distance);
         let first_of_view = frames.par_iter().step_by(scene.uniform_samples());
-        let pictures = first_of_view.map(|frame| Shown {
+        let pictures = first_of_view.map(|frame| OverBlack {
             width: frame.width,
             height: frame.height,
             pixels: shown(&pen, frame),

@@ -131,6 +131,23 @@ pub(crate) struct FrameError {
     pub(crate) coverage: f64,
 }
 
+impl FrameError {
+    /// Adds a tile: its sum of squares over so many drawings, and the reference's coverage of it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn add_tile(&mut self, squares: f64, coverage: f64, drawings: u32) {
+        let drawings = f64::from(drawings);
+        self.sum.squares += squares;
+        self.sum.coverage += coverage * drawings;
+        self.coverage += coverage;
+        self.tiles.push(of_tile(squares, coverage, drawings));
+    }
+}
+
+/// `E^2` of a tile.
+fn of_tile(squares: f64, coverage: f64, drawings: f64) -> f64 {
+    squares / (coverage.max(LEAST_OF_TILE) * drawings.max(1.0))
+}
+
 /// Adds up the drawings of one frame, one for each offset.
 pub(crate) struct Tally<'a> {
     reference: &'a Reference,
@@ -189,7 +206,7 @@ impl<'a> Tally<'a> {
             }
         }
         for (tile, coverage) in tiles.iter_mut().zip(&reference.tile_coverage) {
-            *tile /= coverage.max(LEAST_OF_TILE) * drawings.max(1.0);
+            *tile = of_tile(*tile, *coverage, drawings);
         }
         FrameError {
             sum: ErrorSum {
