@@ -25,8 +25,10 @@ pub struct Facts {
 pub struct ValueFacts {
     /// How many samples the figures stand for.
     pub count: u64,
-    /// The mean of each component.
+    /// The mean of each component, weighed by how much each sample is seen.
     pub mean: Vec<f32>,
+    /// What the samples of each component weigh together; empty where each weighs 1.
+    pub weight: Vec<f64>,
     /// The smallest value of each component; NaN when a NaN was seen.
     pub min: Vec<f32>,
     /// The largest value of each component; NaN when a NaN was seen.
@@ -49,16 +51,16 @@ impl Facts {
             .filter_map(|id| self.values.get(id))
             .filter(|facts| facts.count > 0 && facts.mean.len() == count)
             .collect();
-        let samples: f64 = seen.iter().map(|facts| facts.count as f64).sum();
         let mean: Vec<f32> = match seen[..] {
             [] => return Err(Declined("no sample of the scene computes it".into())),
             [only] => only.mean.clone(),
             _ => (0..count)
                 .map(|i| {
-                    let weighted = |facts: &&ValueFacts| {
-                        f64::from(facts.mean[i]) * (facts.count as f64 / samples)
-                    };
-                    seen.iter().map(weighted).sum::<f64>() as f32
+                    let whole: f64 = seen.iter().map(|facts| facts.weight(i)).sum();
+                    let weighed = seen.iter().filter(|facts| facts.weight(i) > 0.0);
+                    let part =
+                        |facts: &&ValueFacts| f64::from(facts.mean[i]) * (facts.weight(i) / whole);
+                    weighed.map(part).sum::<f64>() as f32
                 })
                 .collect(),
         };
@@ -70,11 +72,19 @@ impl Facts {
     }
 }
 
+impl ValueFacts {
+    /// What its samples weigh together in the mean of a component.
+    fn weight(&self, component: usize) -> f64 {
+        let weight = self.weight.get(component).copied();
+        weight.unwrap_or(self.count as f64)
+    }
+}
+
 /// Means and central second moments of two numbers that are seen together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
-    /// How often they were seen.
-    pub count: u64,
+    /// How often they were seen, weighed by how much.
+    pub weight: f64,
     /// The mean of each.
     pub mean: [f64; 2],
     /// The sum of the squared differences of each from its mean.
@@ -84,35 +94,38 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Takes in another pair (Welford, "Note on a method for calculating corrected sums of squares and products",
-    /// 1962).
-    pub fn add(&mut self, pair: [f64; 2]) {
-        self.count += 1;
-        let part = 1.0 / self.count as f64;
+    /// Takes in another pair, with a weight (Welford, "Note on a method for calculating corrected sums of squares and
+    /// products", 1962, and with weights West, "Updating mean and variance estimates", 1979).
+    pub fn add(&mut self, pair: [f64; 2], weight: f64) {
+        if weight <= 0.0 {
+            return;
+        }
+        self.weight += weight;
+        let part = weight / self.weight;
         let before = [0, 1].map(|i| pair[i] - self.mean[i]);
         for i in 0..2 {
             self.mean[i] += before[i] * part;
-            self.squares[i] += before[i] * (pair[i] - self.mean[i]);
+            self.squares[i] += weight * before[i] * (pair[i] - self.mean[i]);
         }
-        self.product += before[0] * (pair[1] - self.mean[1]);
+        self.product += weight * before[0] * (pair[1] - self.mean[1]);
     }
 
     /// Adds what was seen elsewhere (Chan, Golub, LeVeque, "Updating formulae and a pairwise algorithm for computing
     /// sample variances", 1979).
     pub fn merge(&mut self, other: &Self) {
-        if other.count == 0 {
+        if other.weight == 0.0 {
             return;
         }
-        let count = self.count + other.count;
-        let part = other.count as f64 / count as f64;
+        let whole = self.weight + other.weight;
+        let part = other.weight / whole;
         let apart = [0, 1].map(|i| other.mean[i] - self.mean[i]);
-        let weight = self.count as f64 * part;
+        let weight = self.weight * part;
         for (i, apart) in apart.into_iter().enumerate() {
             self.mean[i] += apart * part;
             self.squares[i] += other.squares[i] + apart * apart * weight;
         }
         self.product += other.product + apart[0] * apart[1] * weight;
-        self.count = count;
+        self.weight = whole;
     }
 
     /// The scale and the offset with which the second number comes closest to the first one, in least squares;
@@ -128,7 +141,8 @@ impl Moments {
     pub fn error_of(&self, [scale, offset]: [f64; 2]) -> f64 {
         let shift = self.mean[0] - scale * self.mean[1] - offset;
         let spread = self.squares[0] - 2.0 * scale * self.product + scale * scale * self.squares[1];
-        spread.max(0.0) / self.count.max(1) as f64 + shift * shift
+        let weight = if self.weight > 0.0 { self.weight } else { 1.0 };
+        spread.max(0.0) / weight + shift * shift
     }
 }
 
@@ -180,7 +194,8 @@ fn at_level(levels: &[[f32; 4]], level: f32) -> Option<[f32; 4]> {
 /// What is known of the image behind a texture. Colours are linear, as a sample returns them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextureFacts {
-    /// The mean over the whole texture at each MIP level, finest first, not alpha-weighted.
+    /// The mean over the whole texture at each MIP level, finest first; where its alpha is what is seen of the
+    /// others, those are weighed by it.
     pub mean: Vec<[f32; 4]>,
     /// The least-squares error of that mean at each MIP level: the standard deviation of its texels
     /// (Olano, section 2.1).
@@ -201,6 +216,7 @@ mod tests {
         let seen = ValueFacts {
             count: 4,
             mean: vec![0.25],
+            weight: Vec::new(),
             min: vec![0.0],
             max: vec![1.0],
         };
@@ -235,6 +251,16 @@ mod tests {
         }
         assert_eq!(facts.mean(&ids, 1), Ok(vec![0.25]));
         assert!(facts.mean(&ids[2..], 1).is_err());
+        // By what they weigh, where samples do not weigh the same: 3 parts of the first and 1 of the second. What
+        // weighs nothing has no mean.
+        for (id, weight) in ids.iter().zip([1.5, 0.5, 0.0]) {
+            let seen = facts.values.entry(id.clone()).or_default();
+            seen.count = 4;
+            seen.weight = vec![weight];
+        }
+        facts.values.entry(ids[2].clone()).or_default().mean = vec![f32::NAN];
+        assert_eq!(facts.mean(&ids, 1), Ok(vec![0.75]));
+        assert!(facts.mean(&ids[2..], 1).is_err());
     }
 
     #[test]
@@ -254,6 +280,22 @@ mod tests {
     }
 
     #[test]
+    fn moments_weigh_pairs() {
+        // A pair that weighs 3 is as good as three of them, and one that weighs nothing does not count.
+        let (mut weighed, mut told) = (Moments::default(), Moments::default());
+        weighed.add([1.0, 2.0], 3.0);
+        weighed.add([f64::INFINITY, 9.0], 0.0);
+        weighed.add([5.0, 4.0], 1.0);
+        for pair in [[1.0, 2.0], [1.0, 2.0], [5.0, 4.0], [1.0, 2.0]] {
+            told.add(pair, 1.0);
+        }
+        assert_eq!(weighed, told);
+        // Means 2 and 2.5; 3 * 1 * 0.5 + 3 * 1.5 and so on.
+        assert_eq!((weighed.mean, weighed.product), ([2.0, 2.5], 6.0));
+        assert_eq!(weighed.squares, [12.0, 3.0]);
+    }
+
+    #[test]
     fn moments_give_the_line_and_merge() {
         let pairs = [
             [1.0, 1e6],
@@ -264,14 +306,14 @@ mod tests {
         let mut whole = Moments::default();
         let mut halves = [Moments::default(); 2];
         for (i, pair) in pairs.into_iter().enumerate() {
-            whole.add(pair);
-            halves[i / 2].add(pair);
+            whole.add(pair, 1.0);
+            halves[i / 2].add(pair, 1.0);
         }
         let [mut merged, other] = halves;
         merged.merge(&other);
         merged.merge(&Moments::default());
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-6 * a.abs().max(1.0), "{a} {b}");
-        assert_eq!(merged.count, 4);
+        assert_eq!(merged.weight, 4.0);
         close(merged.product, whole.product);
         close(merged.squares[0], whole.squares[0]);
         close(merged.squares[1], whole.squares[1]);
@@ -286,8 +328,8 @@ mod tests {
         close(whole.error_of([0.0, 4.0]), 26.0 / 4.0);
         close(whole.error_of([0.0, 5.0]), 26.0 / 4.0 + 1.0);
         let mut still = Moments::default();
-        still.add([1.0, 2.0]);
-        still.add([2.0, 2.0]);
+        still.add([1.0, 2.0], 1.0);
+        still.add([2.0, 2.0], 1.0);
         assert_eq!(still.line(), None);
     }
 

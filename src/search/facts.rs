@@ -2,8 +2,9 @@
 //! distance.
 
 use super::samples::SampleSet;
-use crate::eval::draw::{Shading, shade_into};
-use crate::eval::program::Program;
+use crate::eval::draw::{Blend, Shading, shade_into, shade_weighed};
+use crate::eval::machine::Profile;
+use crate::eval::program::{Opacity, Program};
 use crate::eval::texture::{Dimension, Texture};
 use crate::scene::{Scene, SceneTexture, Variation};
 use glam::{Vec2, Vec3};
@@ -19,15 +20,19 @@ impl SampleSet<'_> {
     pub fn facts(&self, shader: &Shader) -> Facts {
         let uniforms = self.stand.scene.uniforms.iter();
         let dynamic = uniforms.filter(|uniform| uniform.variation == Variation::Dynamic);
-        let mut facts = Facts {
-            textures: texture_facts(self.stand.scene, self.distance()),
-            dynamic: dynamic.map(|uniform| uniform.path.clone()).collect(),
-            ..Facts::default()
-        };
         let probes = float_values(shader);
         let pairs = op_removal::pairs(shader);
         // A shader always has a fragment stage.
         let entry = shader.index(Stage::Fragment).unwrap_or(0);
+        let states = &self.stand.scene.states;
+        let blended = states.iter().any(|state| state.blend != Blend::Opaque);
+        let opacity = Program::opacity(shader.module(), entry, &probes, &pairs, blended);
+        let opacity = opacity.unwrap_or_default();
+        let mut facts = Facts {
+            textures: texture_facts(self.stand.scene, self.distance(), &opacity),
+            dynamic: dynamic.map(|uniform| uniform.path.clone()).collect(),
+            ..Facts::default()
+        };
         let compiled = Program::compile_with_pairs(shader.module(), entry, &probes, &pairs);
         let Ok(program) = compiled else {
             return facts;
@@ -38,10 +43,23 @@ impl SampleSet<'_> {
             .flat_map_iter(|frame| frame.drawings.iter().map(move |drawing| (frame, drawing)))
             .map(|(frame, drawing)| {
                 let mut shading = Shading::default();
-                let seen = drawing.seen.as_ref().unwrap_or(&drawing.coverage);
-                shade_into(&program, seen, &frame.bindings, &mut shading);
-                (shading.profile.probes, shading.profile.pairs)
+                let Some(seen) = &drawing.seen else {
+                    shade_into(&program, &drawing.coverage, &frame.bindings, &mut shading);
+                    return shading.profile;
+                };
+                let Some(weights) = &seen.weights else {
+                    shade_into(&program, &seen.coverage, &frame.bindings, &mut shading);
+                    return shading.profile;
+                };
+                let mut weighed = |weights| {
+                    let bindings = &frame.bindings;
+                    shade_weighed(&program, &seen.coverage, bindings, weights, &mut shading);
+                    shading.profile.clone()
+                };
+                let by_share = weighed(&weights.share);
+                with_opacity(by_share, weighed(&weights.arrives), &opacity)
             })
+            .map(|profile| (profile.probes, profile.pairs))
             .collect();
         let id = |value| shader.id(Stage::Fragment, value).clone();
         for (i, (value, operand)) in pairs.into_iter().enumerate() {
@@ -63,10 +81,11 @@ impl SampleSet<'_> {
                 .max()
                 .unwrap_or(0);
             for component in 0..components {
-                let (mut count, mut sum) = (0, 0.0);
+                let (mut count, mut weight, mut sum) = (0, 0.0, 0.0);
                 let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
                 for probe in profiles.iter().filter_map(|frame| frame[i].get(component)) {
                     count += probe.count;
+                    weight += probe.weight;
                     sum += probe.sum;
                     // A NaN stays: it must be seen.
                     min = if min.is_nan() || probe.min > min {
@@ -81,7 +100,10 @@ impl SampleSet<'_> {
                     };
                 }
                 fact.count = count;
-                fact.mean.push((sum / count.max(1) as f64) as f32);
+                fact.mean.push((sum / weight) as f32);
+                if blended {
+                    fact.weight.push(weight);
+                }
                 fact.min.push(min);
                 fact.max.push(max);
             }
@@ -93,18 +115,46 @@ impl SampleSet<'_> {
     }
 }
 
-/// What is known of every texture that is not dynamic, at the MIP level that a distance leads to.
-fn texture_facts(scene: &Scene, distance: f64) -> BTreeMap<String, TextureFacts> {
+/// What was seen of values, each fragment weighed by its share of the picture, but of what their opacity is made of, which
+/// is worth as much whatever it is: where that is so, it is as the second profile has it.
+fn with_opacity(mut profile: Profile, opacity_profile: Profile, opacity: &Opacity) -> Profile {
+    let probes = profile.probes.iter_mut().zip(opacity_profile.probes);
+    for ((probes, others), parts) in probes.zip(&opacity.probes) {
+        for ((probe, other), part) in probes.iter_mut().zip(others).zip(parts) {
+            if *part {
+                *probe = other;
+            }
+        }
+    }
+    let pairs = profile.pairs.iter_mut().zip(opacity_profile.pairs);
+    for ((pairs, others), parts) in pairs.zip(&opacity.pairs) {
+        for ((pair, other), part) in pairs.iter_mut().zip(others).zip(parts) {
+            if *part {
+                *pair = other;
+            }
+        }
+    }
+    profile
+}
+
+/// What is known of every texture that is not dynamic, at the MIP level that a distance leads to. Where a texture's alpha
+/// is its fragments' opacity, its colours are weighed by it.
+fn texture_facts(
+    scene: &Scene,
+    distance: f64,
+    opacity: &Opacity,
+) -> BTreeMap<String, TextureFacts> {
     let known = scene.textures.iter().filter(|texture| !texture.dynamic);
     known
         .map(|texture| {
+            let weighed = opacity.textures.contains(&(texture.group, texture.binding));
             let level = texels_per_pixel(scene, texture, distance)
                 .unwrap_or(1.0)
                 .log2();
             (
                 texture.name.clone(),
                 match texture.images.as_slice() {
-                    [image] => image.facts(level.max(0.0) as f32),
+                    [image] => image.facts(level.max(0.0) as f32, weighed),
                     // Draws with different images share no mean; what the samples see of them does.
                     _ => TextureFacts::default(),
                 },

@@ -5,7 +5,7 @@ use super::error::{
     BACKGROUNDS, FrameError, Reference, ReferencePixel, Shown, TILE, Tally, displayed, encoded,
     held, through,
 };
-use crate::eval::draw::{Layers, Lit, Shading, each_visible, resolve, seen, shade_into};
+use crate::eval::draw::{Layers, Lit, Seen, Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::image::Picture;
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
@@ -51,7 +51,7 @@ pub(super) struct Drawing {
     /// What lights it, in a deferred scene.
     lit: Option<Lit>,
     /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
-    pub(super) seen: Option<Coverage>,
+    pub(super) seen: Option<Seen>,
     /// For each covered fragment, its place in the reference.
     places: Vec<u32>,
 }
@@ -123,7 +123,8 @@ impl Rasterised {
                 let drawings = coverages.into_iter().zip(offsets);
                 let drawings = drawings.map(|(coverage, offset)| {
                     let lit = pen.scene.lit(&at(frame, *offset, 1), &coverage);
-                    Drawing::new(pen.fragment, coverage, lit, &pixels, &frame.bindings)
+                    let bindings = (&frame.bindings, output);
+                    Drawing::new(pen.fragment, coverage, lit, &pixels, bindings)
                 });
                 Self {
                     view,
@@ -293,7 +294,7 @@ impl Drawing {
         coverage: Coverage,
         lit: Option<Lit>,
         pixels: &[u32],
-        bindings: &Bindings,
+        (bindings, output): (&Bindings, Output),
     ) -> Self {
         let mut places = vec![0; coverage.fragments];
         for (place, pixel) in places.iter_mut().zip(coverage.pixels()) {
@@ -301,10 +302,10 @@ impl Drawing {
             *place = pixels.binary_search(&pixel).unwrap_or(0) as u32;
         }
         Self {
-            seen: coverage.late.then(|| {
+            seen: (coverage.late || coverage.blends()).then(|| {
                 let mut shading = Shading::default();
                 shade_into(original, &coverage, bindings, &mut shading);
-                seen(&coverage, &shading)
+                seen(&coverage, &shading, |colour| held(output, colour))
             }),
             places,
             lit,

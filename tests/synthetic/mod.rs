@@ -26,6 +26,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
                 shader.id(stage, value).clone(),
                 ValueFacts {
                     count: 64,
+                    weight: Vec::new(),
                     mean: vec![0.5; count],
                     min: vec![0.0; count],
                     max: vec![1.0; count],
@@ -40,7 +41,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
         };
         // A value that falls from 0.75 as its operand rises, a little off the line.
         let seen = Moments {
-            count: 64,
+            weight: 64.0,
             mean: [0.5, 0.5],
             squares: [1.25, 4.0],
             product: -2.0,

@@ -179,7 +179,7 @@ impl<'a> Survey<'a> {
         self.holds_for_all(site)?;
         let pair = (self.flow.id(site).clone(), self.flow.id(operand).clone());
         let seen = self.facts.pairs.get(&pair);
-        let seen = seen.filter(|seen| seen.iter().all(|moments| moments.count > 0));
+        let seen = seen.filter(|seen| seen.iter().all(|moments| moments.weight > 0.0));
         let seen = seen.ok_or_else(|| Declined("no sample of the scene computes it".into()))?;
         let can_keep =
             self.flow.inner(operand) == self.flow.inner(site) && self.keep(site, operand).is_ok();
@@ -491,6 +491,7 @@ mod tests {
                 let (min, max) = if id.path() == "x" { range } else { (0.0, 1.0) };
                 let seen = ValueFacts {
                     count: 9,
+                    weight: Vec::new(),
                     mean: vec![0.5 * (min + max); count],
                     min: vec![min; count],
                     max: vec![max; count],

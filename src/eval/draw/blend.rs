@@ -68,6 +68,29 @@ impl Blend {
     }
 }
 
+impl Blend {
+    /// How much of the light that arrives from a fragment's place is its own, by its colour as the target holds it:
+    /// its alpha. What is premultiplied may add more light than it hides.
+    fn share(self, [r, g, b, a]: [f32; 4]) -> f32 {
+        let share = match self {
+            Self::Opaque => 1.0,
+            Self::Alpha | Self::Additive => a,
+            Self::Premultiplied => a.max(r).max(g).max(b),
+        };
+        // A NaN is no share.
+        share.max(0.0).min(1.0)
+    }
+
+    /// How much of what is behind a fragment is still seen.
+    fn kept(self, [_, _, _, a]: [f32; 4]) -> f32 {
+        match self {
+            Self::Opaque => 0.0,
+            Self::Alpha | Self::Premultiplied => (1.0 - a).max(0.0).min(1.0),
+            Self::Additive => 1.0,
+        }
+    }
+}
+
 /// How a draw gets into the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DrawState {
@@ -100,6 +123,16 @@ struct Layer {
 }
 
 const NONE: u32 = u32::MAX;
+
+/// What the fragments of a coverage weigh in its picture, 0..1 each; 0 for those that are hidden.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weights {
+    /// How much of the light that leaves a fragment's place arrives, through what is in front of it: what the
+    /// fragment's opacity is worth.
+    pub arrives: Vec<f32>,
+    /// The part of it that is the fragment's own, by its alpha: what its colour is worth.
+    pub share: Vec<f32>,
+}
 
 impl Layers {
     /// Finds them. `place` numbers the pixels, below `places`, from a fragment and its fine pixel.
@@ -187,6 +220,29 @@ impl Layers {
             let fragment = std::mem::replace(&mut next, layer.next);
             Some((fragment as usize, layer.blend))
         })
+    }
+
+    /// What each fragment weighs in the picture, its colours being as the target holds them.
+    pub(crate) fn weights(
+        &self,
+        shading: &Shading,
+        held: impl Fn([f32; 4]) -> [f32; 4],
+    ) -> Weights {
+        let mut weights = Weights {
+            arrives: vec![0.0; self.layers.len()],
+            share: vec![0.0; self.layers.len()],
+        };
+        for place in 0..self.first.len() {
+            let layers: Vec<_> = self.at(place).collect();
+            let mut arrives = 1.0;
+            for (fragment, blend) in layers.into_iter().rev() {
+                let colour = held(shading.colours[fragment]);
+                weights.arrives[fragment] = arrives;
+                weights.share[fragment] = arrives * blend.share(colour);
+                arrives *= blend.kept(colour);
+            }
+        }
+        weights
     }
 
     /// What is composed at a place, of colours as the target holds them: premultiplied colour and coverage. `None`

@@ -181,7 +181,8 @@ impl Lit {
         bindings: &Bindings,
         shading: &mut Shading,
     ) {
-        shade_targets(material, coverage, bindings, &self.locations, shading);
+        let locations = &self.locations;
+        shade_targets(material, coverage, bindings, locations, None, shading);
         let seen = self.seen(coverage, shading);
         let size = [coverage.width, coverage.height];
         let mut images = self.lighting.clear(size);

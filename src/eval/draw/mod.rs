@@ -6,7 +6,7 @@ mod light;
 #[cfg(test)]
 mod tests;
 
-pub use blend::{Blend, DrawState};
+pub use blend::{Blend, DrawState, Weights};
 pub(crate) use blend::{Layers, state_of};
 pub use format::Format;
 pub use light::{Lighting, Lit, Plane};
@@ -67,7 +67,7 @@ pub fn shade(fragment: &Program, coverage: &Coverage, bindings: &Bindings) -> Sh
         });
     let further: BTreeSet<u32> = further.collect();
     let further: Vec<u32> = further.into_iter().collect();
-    shade_targets(fragment, coverage, bindings, &further, &mut shading);
+    shade_targets(fragment, coverage, bindings, &further, None, &mut shading);
     shading
 }
 
@@ -81,7 +81,21 @@ pub fn shade_into(
     bindings: &Bindings,
     shading: &mut Shading,
 ) {
-    shade_targets(fragment, coverage, bindings, &[], shading);
+    shade_targets(fragment, coverage, bindings, &[], None, shading);
+}
+
+/// The same with what each covered fragment weighs in the program's probes.
+///
+/// # Panics
+/// When a resource of the program is not bound, or there are fewer weights than fragments.
+pub fn shade_weighed(
+    fragment: &Program,
+    coverage: &Coverage,
+    bindings: &Bindings,
+    weights: &[f32],
+    shading: &mut Shading,
+) {
+    shade_targets(fragment, coverage, bindings, &[], Some(weights), shading);
 }
 
 /// The same with what the program returns at further locations.
@@ -90,6 +104,7 @@ fn shade_targets(
     coverage: &Coverage,
     bindings: &Bindings,
     targets: &[u32],
+    weights: Option<&[f32]>,
     shading: &mut Shading,
 ) {
     let interface = Interface::new(fragment, coverage, targets);
@@ -125,6 +140,7 @@ fn shade_targets(
                 .collect(),
             alive: alive.split_off_mut(..count).unwrap_or_default(),
             depths: depths.split_off_mut(..count).unwrap_or_default(),
+            weights,
         });
     }
     let profiles: Vec<Profile> = jobs
@@ -162,17 +178,33 @@ pub fn resolve(coverage: &Coverage, shading: &Shading) -> Picture {
     picture
 }
 
-/// The coverage with those fragments alone that the picture is made of; the others have become helpers.
-/// What a shader that discards computes where it is hidden should not count as seen.
-pub fn seen(coverage: &Coverage, shading: &Shading) -> Coverage {
+/// The fragments that a picture is made of.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The coverage with those fragments alone; the others have become helpers.
+    pub coverage: Coverage,
+    /// What they weigh, where they are blended; else each weighs 1.
+    pub weights: Option<Weights>,
+}
+
+/// Finds the fragments that a picture is made of. What a shader that discards computes where it is hidden should not
+/// count as seen. `held` is what the target holds of a colour that is blended.
+pub fn seen(coverage: &Coverage, shading: &Shading, held: impl Fn([f32; 4]) -> [f32; 4]) -> Seen {
     let mut shown = vec![false; coverage.fragments];
     let places = coverage.width as usize * coverage.height as usize;
-    if coverage.blends() {
+    let weights = coverage.blends().then(|| {
         let layers = Layers::new(coverage, shading, places, |_, pixel| pixel);
-        for (fragment, _) in (0..places).flat_map(|place| layers.at(place)) {
-            shown[fragment] = true;
+        let mut weights = layers.weights(shading, held);
+        for (shown, arrives) in shown.iter_mut().zip(&weights.arrives) {
+            *shown = *arrives > 0.0;
         }
-    } else {
+        for list in [&mut weights.arrives, &mut weights.share] {
+            let mut kept = shown.iter();
+            list.retain(|_| kept.next().copied().unwrap_or(false));
+        }
+        weights
+    });
+    if weights.is_none() {
         for fragment in nearest(coverage, shading).into_iter().flatten() {
             shown[fragment as usize] = true;
         }
@@ -189,7 +221,10 @@ pub fn seen(coverage: &Coverage, shading: &Shading) -> Coverage {
         }
         seen.fragments += block.covered_count();
     }
-    seen
+    Seen {
+        coverage: seen,
+        weights,
+    }
 }
 
 /// For each fine pixel the fragment that it shows: the nearest that is alive, of equal ones the first.
@@ -343,6 +378,8 @@ struct Job<'a> {
     targets: Vec<&'a mut [[f32; 4]]>,
     alive: &'a mut [bool],
     depths: &'a mut [f32],
+    /// Of all fragments of the coverage, where they do not weigh the same.
+    weights: Option<&'a [f32]>,
 }
 
 impl Job<'_> {
@@ -367,6 +404,13 @@ impl Job<'_> {
                     &chosen
                 }
             };
+            if let Some(weights) = self.weights {
+                let mut of_lanes = [0.0; LANES];
+                for (i, lane) in block.covered.lanes().enumerate() {
+                    of_lanes[lane] = weights[block.first + i];
+                }
+                machine.weigh(&of_lanes);
+            }
             let kept = machine.run(inputs, block.active, block.covered, &mut outputs);
             for lane in block.covered.lanes() {
                 self.colours[fragment] = colour(&interface.colour, &outputs, lane);

@@ -74,7 +74,9 @@ fn a_returned_depth_counts() {
 
 #[test]
 fn what_is_hidden_is_not_seen() {
-    let seen = seen(&coverage([0.5, 0.2, 0.2]), &shading([true; 3]));
+    let seen = seen(&coverage([0.5, 0.2, 0.2]), &shading([true; 3]), |c| c);
+    assert_eq!(seen.weights, None);
+    let seen = seen.coverage;
     assert_eq!(seen.fragments, 2);
     let block = &seen.blocks[0];
     assert_eq!(block.covered, Mask([0b1_0010, 0, 0, 0]));
@@ -88,6 +90,7 @@ fn profiles_add_up() {
         lanes: 2,
         probes: vec![vec![Probe {
             count: 2,
+            weight: 2.0,
             sum: f64::from(min + max),
             min,
             max,
@@ -436,4 +439,46 @@ fn blended_fragments_are_composed_from_the_farthest_to_the_nearest() {
     let picture = resolve(&blended([0.5; 3], [Additive; 2]), &shading);
     assert_eq!(picture.pixels[1], [0.5, 0.0, 0.0, 0.0]);
     assert_eq!(picture.covered, [0.0, 1.0]);
+}
+
+#[test]
+fn fragments_weigh_what_the_picture_shows_of_them() {
+    use Blend::{Additive, Alpha, Opaque, Premultiplied};
+    let mut shading = shading([true; 3]);
+    // On the first pixel two, on the second one.
+    shading.colours = vec![
+        [0.0, 0.0, 0.0, 0.5],
+        [0.0, 0.0, 0.0, 0.25],
+        [0.0, 0.5, 0.0, 0.25],
+    ];
+    let weights = |first: f32, blends| {
+        let seen = seen(&blended([first, 0.5, 0.5], blends), &shading, |c| c);
+        let weights = seen.weights.expect("it blends");
+        assert_eq!(weights.arrives.len(), seen.coverage.fragments);
+        (weights.arrives, weights.share)
+    };
+    let list = |all: &[f32]| all.to_vec();
+    for (first, blends, arrives, share) in [
+        (
+            0.2,
+            [Alpha, Alpha],
+            &[1.0, 1.0, 0.5][..],
+            &[0.5, 0.25, 0.125][..],
+        ),
+        (0.8, [Alpha, Alpha], &[0.75, 1.0, 1.0], &[0.375, 0.25, 0.25]),
+        (0.8, [Opaque, Alpha], &[0.75, 1.0, 1.0], &[0.75, 1.0, 0.25]),
+        // What adds light hides nothing, and what is premultiplied may add more than it hides.
+        (0.8, [Alpha, Additive], &[1.0, 1.0, 1.0], &[0.5, 0.25, 0.25]),
+        (
+            0.8,
+            [Alpha, Premultiplied],
+            &[0.75, 1.0, 1.0],
+            &[0.375, 0.25, 0.5],
+        ),
+        // What is hidden is not there.
+        (0.2, [Opaque, Alpha], &[1.0, 1.0], &[1.0, 1.0]),
+    ] {
+        let found = weights(first, blends);
+        assert_eq!(found, (list(arrives), list(share)), "{first} {blends:?}");
+    }
 }

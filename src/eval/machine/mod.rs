@@ -107,7 +107,9 @@ impl Profile {
 pub struct Probe {
     /// How many lanes.
     pub count: u64,
-    /// Their sum, accumulated in f64 in lane order.
+    /// What they weigh together: as much as they are, unless the machine was told otherwise.
+    pub weight: f64,
+    /// Their weighted sum, accumulated in f64 in lane order.
     pub sum: f64,
     /// The smallest; NaN when one was NaN, infinite when there was none.
     pub min: f32,
@@ -119,6 +121,7 @@ impl Default for Probe {
     fn default() -> Self {
         Self {
             count: 0,
+            weight: 0.0,
             sum: 0.0,
             min: f32::INFINITY,
             max: f32::NEG_INFINITY,
@@ -127,10 +130,17 @@ impl Default for Probe {
 }
 
 impl Probe {
-    fn add(&mut self, value: f32) {
+    fn add(&mut self, value: f32, weight: f64) {
+        // What weighs nothing may be infinite.
+        let sum = if weight > 0.0 {
+            weight * f64::from(value)
+        } else {
+            0.0
+        };
         self.absorb(&Self {
             count: 1,
-            sum: f64::from(value),
+            weight,
+            sum,
             min: value,
             max: value,
         });
@@ -139,6 +149,7 @@ impl Probe {
     /// Adds what others held. NaN wins, unlike in `f32::min`.
     pub fn absorb(&mut self, other: &Self) {
         self.count += other.count;
+        self.weight += other.weight;
         self.sum += other.sum;
         if other.min < self.min || other.min.is_nan() {
             self.min = other.min;
@@ -170,6 +181,8 @@ pub struct Machine<'a, R = f32> {
     /// Lanes of quads that are not over.
     going: Mask,
     covered: Mask,
+    /// What each lane weighs in probes; each 1 when there is nothing.
+    weights: Option<Box<[f32; LANES]>>,
     discarded: Mask,
     ran_away: Mask,
     rounds: u32,
@@ -254,6 +267,7 @@ impl<'a, R: Lane> Machine<'a, R> {
             waiting: vec![Mask::default(); code.labels as usize],
             going: Mask::default(),
             covered: Mask::default(),
+            weights: None,
             discarded: Mask::default(),
             ran_away: Mask::default(),
             rounds: 0,
@@ -283,6 +297,11 @@ impl<'a, R: Lane> Machine<'a, R> {
         }
         machine.instructions(&code.prologue);
         machine
+    }
+
+    /// Says what each lane of the next blocks weighs in probes, 0 or more.
+    pub fn weigh(&mut self, weights: &[f32; LANES]) {
+        **self.weights.get_or_insert_with(|| Box::new([1.0; LANES])) = *weights;
     }
 
     /// Runs one block. `inputs` has one entry per slot of [`Program::inputs`], `outputs` one per slot
@@ -704,12 +723,14 @@ impl<'a, R: Lane> Machine<'a, R> {
                     };
                     value.to_f32()
                 };
+                let weights = self.weights.as_deref();
+                let weight = |lane: usize| weights.map_or(1.0, |weights| f64::from(weights[lane]));
                 let probe = *probe as usize;
                 match probe.checked_sub(self.probes.len()) {
                     None => {
                         for (probe, register) in self.probes[probe].iter_mut().zip(values) {
                             for lane in lanes.lanes() {
-                                probe.add(read(register, lane));
+                                probe.add(read(register, lane), weight(lane));
                             }
                         }
                     }
@@ -717,7 +738,8 @@ impl<'a, R: Lane> Machine<'a, R> {
                         let both = values.as_chunks::<2>().0.iter();
                         for (moments, both) in self.pairs[pair].iter_mut().zip(both) {
                             for lane in lanes.lanes() {
-                                moments.add(both.each_ref().map(|r| f64::from(read(r, lane))));
+                                let pair = both.each_ref().map(|r| f64::from(read(r, lane)));
+                                moments.add(pair, weight(lane));
                             }
                         }
                     }

@@ -11,11 +11,13 @@ pub(super) mod code;
 mod expression;
 mod ir;
 mod lower;
+mod opacity;
 mod refused;
 mod registers;
 mod simplify;
 mod uniform;
 
+pub use opacity::Opacity;
 pub use refused::Refused;
 
 use lodc_passes::Work;
@@ -73,6 +75,39 @@ impl Program {
         probes: &[Handle<Expression>],
     ) -> Result<Self, Refused> {
         Self::compile_with_pairs(module, entry, probes, &[])
+    }
+
+    /// What the opacity of an entry point's fragments is made of, among such probes and the textures. Where fragments
+    /// are `blended`, their alpha at location 0 is seen; what decides about a discard always is.
+    ///
+    /// # Errors
+    /// As [`compile`](Self::compile).
+    ///
+    /// # Panics
+    /// As [`compile`](Self::compile).
+    pub fn opacity(
+        module: &Module,
+        entry: usize,
+        probes: &[Handle<Expression>],
+        pairs: &[(Handle<Expression>, Handle<Expression>)],
+        blended: bool,
+    ) -> Result<Opacity, Refused> {
+        let entry = &module.entry_points[entry];
+        let ir = lower::Lowering::run(module, entry, probes, pairs)?;
+        let slots = outputs(module, entry.function.result.as_ref());
+        let seen = slots
+            .iter()
+            .zip(&ir.outputs)
+            .filter(|(slot, _)| match slot.binding {
+                Binding::Location {
+                    location: 0,
+                    blend_src: None | Some(0),
+                    ..
+                } => blended && slot.component == 3,
+                Binding::BuiltIn(built_in) => built_in == naga::BuiltIn::SampleMask,
+                Binding::Location { .. } => false,
+            });
+        Ok(Opacity::of(&ir, seen.map(|(_, (value, _))| *value)))
     }
 
     /// The same with probes of values beside an operand of theirs, which has as many components or one.

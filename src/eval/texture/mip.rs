@@ -110,7 +110,7 @@ mod tests {
                 (x * 7 + y * y * 3 + x * y * 5) as f32 % 11.0
             })],
         );
-        let facts = texture.facts(0.0);
+        let facts = texture.facts(0.0, false);
         assert_eq!(facts.mean.len(), 4);
         for mean in &facts.mean {
             assert!((mean[0] - facts.mean[0][0]).abs() < 1e-5, "{mean:?}");
@@ -131,10 +131,52 @@ mod tests {
     #[test]
     fn statistics_of_known_texels() {
         let texture = Texture::new(Dimension::D2, vec![grey(2, 1, |x, _| x as f32 * 2.0)]).unwrap();
-        let facts = texture.facts(1.5);
+        let facts = texture.facts(1.5, false);
         assert_eq!(facts.mean, [[1.0, 0.0, 0.0, 1.0]]);
         assert_eq!(facts.deviation, [[1.0, 0.0, 0.0, 0.0]]);
         assert_eq!(facts.level, 1.5);
+    }
+
+    #[test]
+    fn means_are_weighed_by_alpha_where_it_is_what_is_seen() {
+        // 4 x 4 texels: a column of red that is opaque, one of 0.5 half seen, and two of white that are not.
+        let texels = (0..16).map(|i| match i % 4 {
+            0 => [1.0, 0.0, 0.0, 1.0],
+            1 => [0.5, 0.0, 0.0, 0.5],
+            _ => [1.0, 1.0, 1.0, 0.0],
+        });
+        let image = Image {
+            width: 4,
+            height: 4,
+            texels: texels.collect(),
+        };
+        let texture = Texture::new(Dimension::D2, vec![image]).unwrap();
+        let facts = texture.facts(0.0, true);
+        // Red: (1 * 1 + 0.5 * 0.5) / 1.5, with a variance of (1 * (1 / 6)^2 + 0.5 * (1 / 3)^2) / 1.5 = 1 / 18.
+        assert_eq!(facts.mean, [[1.25 / 1.5, 0.0, 0.0, 0.375]]);
+        let [red, green, _, alpha] = facts.deviation[0];
+        assert!(
+            (red - (1.0_f32 / 18.0).sqrt()).abs() < 1e-6 && green == 0.0,
+            "{red}"
+        );
+        // Of 1, 0.5, 0 and 0 about 0.375.
+        assert!((alpha - 0.171_875_f32.sqrt()).abs() < 1e-6, "{alpha}");
+        assert!(!facts.is_flat());
+        let plain = texture.facts(0.0, false);
+        assert_eq!(plain.mean, [[0.875, 0.5, 0.5, 0.375]]);
+        // What is nowhere seen has a plain mean.
+        let clear = Texture::new(
+            Dimension::D2,
+            vec![Image {
+                width: 2,
+                height: 1,
+                texels: vec![[0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]],
+            }],
+        );
+        assert_eq!(
+            clear.unwrap().facts(0.0, true).mean,
+            [[0.75, 0.0, 0.0, 0.0]]
+        );
     }
 
     #[test]

@@ -222,9 +222,11 @@ impl Texture {
     }
 
     /// Mean and standard deviation of every MIP level, summed in f64 in the order of the texels.
-    /// `level` is the MIP level that a sample at the facts' distance falls on.
-    pub fn facts(&self, level: f32) -> TextureFacts {
-        let (mean, deviation) = self.levels.iter().map(Level::statistics).unzip();
+    /// `level` is the MIP level that a sample at the facts' distance falls on. Where alpha says how much is seen of a
+    /// texel, `weighed`, the other components are weighed by it; alpha itself is not.
+    pub fn facts(&self, level: f32, weighed: bool) -> TextureFacts {
+        let levels = self.levels.iter();
+        let (mean, deviation) = levels.map(|level| level.statistics(weighed)).unzip();
         TextureFacts {
             mean,
             deviation,
@@ -234,26 +236,39 @@ impl Texture {
 }
 
 impl Level {
-    /// The mean and the standard deviation of its texels.
-    fn statistics(&self) -> ([f32; 4], [f32; 4]) {
-        let count = self.texels.len() as f64;
+    /// The mean and the standard deviation of its texels; colours weighed by alpha where that is wanted, and any texel
+    /// has some.
+    fn statistics(&self, weighed: bool) -> ([f32; 4], [f32; 4]) {
+        let alpha: f64 = self.texels.iter().map(|texel| f64::from(texel[3])).sum();
+        let weighed = weighed && alpha > 0.0;
+        let whole = if weighed {
+            alpha
+        } else {
+            self.texels.len() as f64
+        };
+        let whole = [whole, whole, whole, self.texels.len() as f64];
+        let weights = |texel: &[f32; 4]| {
+            let colour = if weighed { f64::from(texel[3]) } else { 1.0 };
+            [colour, colour, colour, 1.0]
+        };
         let mut mean = [0.0_f64; 4];
         for texel in &self.texels {
-            for (sum, &value) in mean.iter_mut().zip(texel) {
-                *sum += f64::from(value);
+            for ((sum, &value), weight) in mean.iter_mut().zip(texel).zip(weights(texel)) {
+                *sum += weight * f64::from(value);
             }
         }
-        let mean = mean.map(|sum| sum / count);
+        let mean: [f64; 4] = std::array::from_fn(|c| mean[c] / whole[c]);
         let mut variance = [0.0_f64; 4];
         for texel in &self.texels {
+            let weights = weights(texel);
             for c in 0..4 {
                 let off = f64::from(texel[c]) - mean[c];
-                variance[c] += off * off;
+                variance[c] += weights[c] * (off * off);
             }
         }
         (
             mean.map(|m| m as f32),
-            variance.map(|v| (v / count).sqrt() as f32),
+            std::array::from_fn(|c| (variance[c] / whole[c]).sqrt() as f32),
         )
     }
 }

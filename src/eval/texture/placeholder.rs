@@ -102,7 +102,7 @@ mod tests {
         assert_eq!((one.layers(), one.level_count()), (2, 7));
         let texels = &one.levels()[0].texels;
         assert!(texels.iter().flatten().all(|c| (0.0..=1.0).contains(c)));
-        let facts = one.facts(0.0);
+        let facts = one.facts(0.0, false);
         assert!((facts.mean[0][0] - 0.5).abs() < 0.1, "{:?}", facts.mean[0]);
         assert!(facts.deviation[0][0] > 0.05, "{:?}", facts.deviation[0]);
     }

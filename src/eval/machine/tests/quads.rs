@@ -168,6 +168,7 @@ fn probes_see_covered_active_lanes() {
     // Lanes 2 to 5.
     let half = Probe {
         count: 4,
+        weight: 4.0,
         sum: 7.0,
         min: 1.0,
         max: 2.5,
