@@ -413,10 +413,27 @@ fn wall(images: &mut Vec<Image>) {
     }));
 }
 
+fn ivy(images: &mut Vec<Image>) {
+    images.push(Image::new("ivy_leaves", 256, |u, v| {
+        let ragged = 0.06 * (fractal(601, 24, 3, u, v) - 0.5);
+        let [near, next, leaf] = pebbles(602, 9, u, v);
+        let cover = smoothstep(0.62, 0.5, near + ragged);
+        let vein = smoothstep(0.1, 0.0, (next - near).abs()) + smoothstep(0.08, 0.02, near);
+        let green = mix3([0.1, 0.24, 0.06], [0.42, 0.52, 0.14], leaf);
+        let green = mix3(green, [0.6, 0.62, 0.3], 0.5 * vein.min(1.0));
+        let old = smoothstep(0.55, 0.75, fractal(603, 5, 5, u, v));
+        let tone = 0.7 + 0.6 * fractal(604, 12, 4, u, v);
+        let lit = scale(mix3(green, [0.55, 0.3, 0.1], 0.8 * old), tone);
+        // Between the leaves nothing is seen: a colour that no leaf has.
+        let [r, g, b] = mix3([0.5, 0.1, 0.6], lit, smoothstep(0.0, 0.1, cover));
+        [r, g, b, cover]
+    }));
+}
+
 /// All textures, in the order of their materials.
 pub(crate) fn all() -> Vec<Image> {
     let mut images = Vec::new();
-    for make in [panel, leather, environment, rock, terrain, wall] {
+    for make in [panel, leather, environment, rock, terrain, wall, ivy] {
         make(&mut images);
     }
     images
