@@ -39,6 +39,10 @@ enum Command {
     Compare(CompareArgs),
     /// Writes the scene file, with everything that is inferred and why
     Init(InitArgs),
+    /// Draws on the GPU for the process that started it
+    #[cfg(feature = "gpu")]
+    #[command(hide = true)]
+    GpuWorker,
 }
 
 #[derive(Debug, Args)]
@@ -197,6 +201,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        #[cfg(feature = "gpu")]
+        Some(Command::GpuWorker) => gpu_worker(),
         None => compile_command(cli.compile),
     };
     match done {
@@ -256,6 +262,13 @@ fn reading(name: &str) -> std::result::Result<BoundReading, String> {
 fn inspect(input: InputArgs) -> Result<()> {
     print(&compile::inspect(&input.request()?)?);
     Ok(())
+}
+
+#[cfg(feature = "gpu")]
+fn gpu_worker() -> Result<()> {
+    crate::gpu::worker::serve(std::io::stdin(), std::io::stdout().lock()).map_err(|error| {
+        Diagnostic::error("the process that asked for pictures has gone away").with_reason(error)
+    })
 }
 
 fn init(arguments: InitArgs) -> Result<()> {

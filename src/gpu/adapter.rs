@@ -181,6 +181,20 @@ impl Gpu {
         })
     }
 
+    /// Whether it is reached by OpenGL.
+    pub(super) fn is_opengl(&self) -> bool {
+        self.adapter.get_info().backend == Backend::Gl
+    }
+
+    /// Whether the driver is Mesa's software Vulkan of a version that crashes on some shaders with uniform buffers, see
+    /// `lavapipe`.
+    pub(super) fn inlines_uniforms(&self) -> bool {
+        let info = self.adapter.get_info();
+        let version = info.driver_info.strip_prefix("Mesa ");
+        let major = version.and_then(|v| v.split('.').next()?.parse::<u32>().ok());
+        info.driver == "llvmpipe" && major.is_some_and(|major| major < 23)
+    }
+
     /// What the adapter is called.
     pub fn label(&self) -> &AdapterLabel {
         &self.label

@@ -243,27 +243,7 @@ impl Around {
             result.binding = None;
         }
         let inner = module.functions.append(inner, Span::UNDEFINED);
-        let vec4 = insert(&mut module, four(Scalar::F32));
-        let two = TypeInner::Array {
-            base: vec4,
-            size: ArraySize::Constant(NonZeroU32::MIN.saturating_add(1)),
-            stride: 16,
-        };
-        let ty = insert(&mut module, two);
-        let place = module.global_variables.append(
-            GlobalVariable {
-                name: Some("frame_place".to_owned()),
-                space: AddressSpace::Uniform,
-                binding: Some(ResourceBinding {
-                    group: place.0,
-                    binding: place.1,
-                }),
-                ty,
-                init: None,
-                memory_decorations: naga::MemoryDecorations::empty(),
-            },
-            Span::UNDEFINED,
-        );
+        let place = place_variable(&mut module, place);
         Self {
             module,
             entry,
@@ -543,6 +523,34 @@ impl Around {
         self.module.entry_points.push(self.entry);
         self.module
     }
+}
+
+/// The buffer of the frame's [`Place`] in a module; added, unless something is bound there already.
+pub(super) fn place_variable(
+    module: &mut Module,
+    (group, binding): (u32, u32),
+) -> Handle<GlobalVariable> {
+    let at = Some(ResourceBinding { group, binding });
+    let known = module.global_variables.iter();
+    if let Some((known, _)) = known.into_iter().find(|(_, global)| global.binding == at) {
+        return known;
+    }
+    let base = insert(module, four(Scalar::F32));
+    let two = TypeInner::Array {
+        base,
+        size: ArraySize::Constant(NonZeroU32::MIN.saturating_add(1)),
+        stride: 16,
+    };
+    let ty = insert(module, two);
+    let place = GlobalVariable {
+        name: Some("frame_place".to_owned()),
+        space: AddressSpace::Uniform,
+        binding: at,
+        ty,
+        init: None,
+        memory_decorations: naga::MemoryDecorations::empty(),
+    };
+    module.global_variables.append(place, Span::UNDEFINED)
 }
 
 fn insert(module: &mut Module, inner: TypeInner) -> Handle<Type> {

@@ -13,12 +13,16 @@
 //! `worker` runs all of this in a child.
 
 mod adapter;
+mod depth;
 mod entry;
 pub mod error;
+mod lavapipe;
+mod opengl;
 mod read;
 mod render;
 mod resources;
 mod vertices;
+pub mod worker;
 
 pub use adapter::{AdapterLabel, Gpu, list};
 pub use render::{Drawn, Pipeline, Renderer, Stages};

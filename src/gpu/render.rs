@@ -9,7 +9,8 @@ use super::adapter::Gpu;
 use super::entry::{self, Colour, Place, Targets};
 use super::resources::{self, Bound, Slot, Slots, Uploads};
 use super::vertices::Layout;
-use crate::eval::draw::{Format, Plane};
+use super::{lavapipe, opengl};
+use crate::eval::draw::{Blend, Format, Plane};
 use crate::eval::raster::Frame;
 use crate::front::Source;
 use crate::scene::{Scene, SceneLighting};
@@ -137,9 +138,14 @@ impl<'g> Renderer<'g> {
     /// Compiles a shader for the frames of a scene, with the scene's lighting where it is deferred.
     ///
     /// # Errors
-    /// When the device cannot draw it: the driver rejects it, it needs more bindings than there are, a target's
+    /// When the scene blends, or the device cannot draw it: the driver rejects it, it needs more bindings than there are, a target's
     /// format cannot be drawn to, or it reads what no scene can fill.
     pub fn pipeline(&self, stages: Stages<'_>, scene: &Scene) -> Result<Pipeline> {
+        let mut states = scene.states.iter();
+        if states.any(|state| state.blend != Blend::Opaque) {
+            return Err(Diagnostic::error("blended surfaces are not drawn on a GPU")
+                .with_note("the evaluator draws them; or say `blend = \"opaque\"` in the scene"));
+        }
         let what = "compiling the shader";
         self.gpu.guarded(what, || {
             let Some(lighting) = &scene.lighting else {
@@ -288,11 +294,11 @@ impl Pass {
     ) -> Result<Self> {
         let place = free(&stages, 0);
         let (module, at) = stages.vertex;
-        let (module, at) = settled(module, at, None)?;
+        let (module, at) = settled(gpu, (module, at), None, place)?;
         let layout = Layout::new(&module, at)?;
         let vertex = entry::vertex(&module, at, place);
         let (module, at) = stages.fragment;
-        let (module, at) = settled(module, at, stages.auto_lod)?;
+        let (module, at) = settled(gpu, (module, at), stages.auto_lod, place)?;
         let fragment = entry::fragment(&module, at, place, &targets);
 
         let mut of_reads: BTreeMap<(u32, u32), TextureFormat> =
@@ -531,13 +537,29 @@ impl Images {
     }
 }
 
-/// The module with its override constants settled, and the place of the entry point in it.
-fn settled(module: &Module, at: usize, auto_lod: Option<f64>) -> Result<(Cow<'_, Module>, usize)> {
+/// The module as the device takes it, with its override constants settled, and the place of the entry point in it.
+fn settled(
+    gpu: &Gpu,
+    (module, at): (&Module, usize),
+    auto_lod: Option<f64>,
+    place: (u32, u32),
+) -> Result<(Module, usize)> {
+    let (mut module, at) = without_overrides(module, at, auto_lod)?;
+    if gpu.is_opengl() {
+        opengl::load_depths(&mut module);
+    }
+    if gpu.inlines_uniforms() {
+        lavapipe::hide_uniforms(&mut module, place);
+    }
+    Ok((module, at))
+}
+
+fn without_overrides(module: &Module, at: usize, auto_lod: Option<f64>) -> Result<(Module, usize)> {
     if module.overrides.is_empty() && auto_lod.is_none() {
-        return Ok((Cow::Borrowed(module), at));
+        return Ok((module.clone(), at));
     }
     let entry = &module.entry_points[at];
-    let (stage, name) = (entry.stage, entry.name.clone());
+    let (stage, name) = (entry.stage, &*entry.name);
     let mut constants = PipelineConstants::default();
     if let Some(value) = auto_lod {
         let mut names = module.overrides.iter().map(|(_, o)| o.name.as_deref());
@@ -550,19 +572,16 @@ fn settled(module: &Module, at: usize, auto_lod: Option<f64>) -> Result<(Cow<'_,
         constants.insert("autoLOD".to_owned(), value);
     }
     let info = validated(module)?;
-    let chosen = Some((stage, &*name));
-    let (module, _) = process_overrides(module, &info, chosen, &constants).map_err(|error| {
+    let settled = process_overrides(module, &info, Some((stage, name)), &constants);
+    let (settled, _) = settled.map_err(|error| {
         Diagnostic::error("an override constant of the shader has no value")
             .with_reason(error)
             .with_note("give it a default in the shader")
     })?;
-    let module = module.into_owned();
-    let found = module
-        .entry_points
-        .iter()
-        .position(|e: &naga::EntryPoint| (e.stage, &*e.name) == (stage, &*name));
+    let mut entries = settled.entry_points.iter();
+    let found = entries.position(|entry| entry.stage == stage && entry.name == name);
     let found = found.ok_or_else(|| Diagnostic::error(format!("the shader has no `{name}`")))?;
-    Ok((Cow::Owned(module), found))
+    Ok((settled.into_owned(), found))
 }
 
 fn validated(module: &Module) -> Result<ModuleInfo> {

@@ -4,6 +4,7 @@
 //! same numbers. Where the adapter cannot filter those, they are of half precision.
 
 use super::adapter::Gpu;
+use super::depth;
 use super::vertices::{self, Layout};
 use crate::eval::machine::Resource;
 use crate::eval::raster::{Attribute, Frame};
@@ -279,7 +280,7 @@ impl Uploads {
                     view_dimension,
                     ..
                 },
-            ) => Bound::Texture(self.texture(gpu, texture, sample_type, view_dimension)?),
+            ) => Bound::Texture(self.texture(gpu, texture, sample_type, view_dimension)),
             (Some(Resource::Sampler(sampler)), BindingType::Sampler(ty)) => {
                 Bound::Sampler(self.sampler(gpu, sampler, ty == SamplerBindingType::Comparison))
             }
@@ -300,7 +301,7 @@ impl Uploads {
         texture: &Arc<Texture>,
         sample: TextureSampleType,
         view: TextureViewDimension,
-    ) -> Result<wgpu::TextureView> {
+    ) -> wgpu::TextureView {
         let of_view = View::of(view);
         let kind = match sample {
             TextureSampleType::Uint => Kind::Uint(of_view),
@@ -310,11 +311,11 @@ impl Uploads {
         };
         let key = (Arc::as_ptr(texture).addr(), kind);
         if let Some((_, view)) = self.textures.get(&key) {
-            return Ok(view.clone());
+            return view.clone();
         }
-        let made = upload(gpu, texture, kind, view)?;
+        let made = upload(gpu, texture, kind, view);
         self.textures.insert(key, (texture.clone(), made.clone()));
-        Ok(made)
+        made
     }
 
     fn sampler(&mut self, gpu: &Gpu, sampler: &Arc<Sampler>, compares: bool) -> wgpu::Sampler {
@@ -366,7 +367,12 @@ pub(super) fn buffer(gpu: &Gpu, bytes: &[u8], ty: BufferBindingType) -> wgpu::Bu
         BufferBindingType::Storage { .. } => (4, BufferUsages::STORAGE),
     };
     let mut contents = bytes.to_vec();
-    contents.resize(bytes.len().max(1).next_multiple_of(unit), 0);
+    let length = bytes.len().max(1).next_multiple_of(unit);
+    contents.resize(length, 0);
+    if ty == BufferBindingType::Uniform && gpu.inlines_uniforms() {
+        // There it is the first of two, see `lavapipe`.
+        contents.resize(2 * length, 0);
+    }
     gpu.device()
         .create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: None,
@@ -415,17 +421,12 @@ fn upload(
     texture: &Texture,
     kind: Kind,
     view: TextureViewDimension,
-) -> Result<wgpu::TextureView> {
+) -> wgpu::TextureView {
     let format = match kind {
         Kind::Float(_) => float_format(gpu),
         Kind::Uint(_) => TextureFormat::Rgba32Uint,
         Kind::Sint(_) => TextureFormat::Rgba32Sint,
-        Kind::Depth(_) => {
-            return Err(
-                Diagnostic::error("depth textures of a scene are not drawn on a GPU yet")
-                    .with_note("the evaluator draws them"),
-            );
-        }
+        Kind::Depth(_) => TextureFormat::Depth32Float,
     };
     let first = &texture.levels()[0];
     // Of one dimension there is one level only.
@@ -433,6 +434,18 @@ fn upload(
         TextureViewDimension::D1 => 1,
         _ => texture.level_count(),
     };
+    let of_view = wgpu::TextureViewDescriptor {
+        dimension: Some(view),
+        array_layer_count: match view {
+            TextureViewDimension::D2 => Some(1),
+            TextureViewDimension::Cube => Some(6),
+            _ => None,
+        },
+        ..Default::default()
+    };
+    if let Kind::Depth(_) = kind {
+        return depth::texture(gpu, texture, levels).create_view(&of_view);
+    }
     let made = gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d {
@@ -485,13 +498,5 @@ fn upload(
             },
         );
     }
-    Ok(made.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(view),
-        array_layer_count: match view {
-            TextureViewDimension::D2 => Some(1),
-            TextureViewDimension::Cube => Some(6),
-            _ => None,
-        },
-        ..Default::default()
-    }))
+    made.create_view(&of_view)
 }

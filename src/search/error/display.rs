@@ -5,7 +5,7 @@ use crate::scene::{Output, ToneMapping};
 
 /// What a display shows of a fragment's colour, in linear light of 0..1. Light below 0 shows as none and
 /// infinite light as the brightest; NaN stays NaN.
-pub(crate) fn displayed(output: Output, colour: [f32; 4]) -> [f32; 3] {
+pub fn displayed(output: Output, colour: [f32; 4]) -> [f32; 3] {
     let [r, g, b, _] = colour;
     [r, g, b].map(|c| {
         if c.is_nan() {
@@ -67,7 +67,7 @@ pub(crate) fn through(output: Output, [r, g, b, a]: [f32; 4]) -> [f32; 3] {
 }
 
 /// Linear light as sRGB, 0..1: what the error compares. NaN stays NaN.
-pub(crate) fn encoded(light: [f32; 3]) -> [f32; 3] {
+pub fn encoded(light: [f32; 3]) -> [f32; 3] {
     light.map(|c| if c.is_nan() { c } else { srgb_encode(c) })
 }
 

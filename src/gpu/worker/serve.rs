@@ -1,0 +1,205 @@
+//! The child: reads requests, draws, answers, until there are no more.
+
+use super::{Answer, Request, Said, Subject, Variant, read_message, write_message, write_numbers};
+use crate::front::Source;
+use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
+use crate::scene::Scene;
+use crate::{Diagnostic, Result};
+use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+
+/// How many pipelines are kept: those of a shader's levels, in turns.
+const KEPT: usize = 16;
+
+/// Answers requests until `from` ends: what `lodc gpu-worker` does.
+///
+/// # Errors
+/// When `to` cannot be written.
+pub fn serve(from: impl Read + Send + 'static, mut to: impl Write) -> std::io::Result<()> {
+    let requests = requests(from);
+    let mut opened: Option<(Option<String>, Gpu)> = None;
+    let mut next = requests.receive.recv().ok();
+    // One turn for each adapter that is asked for.
+    while let Some(request) = next.take() {
+        if opened
+            .as_ref()
+            .is_none_or(|(name, _)| *name != request.adapter)
+        {
+            opened = None;
+            match Gpu::open(request.adapter.as_deref()) {
+                Ok(gpu) => opened = Some((request.adapter.clone(), gpu)),
+                Err(error) => {
+                    refuse(&mut to, *error)?;
+                    next = requests.next();
+                    continue;
+                }
+            }
+        }
+        if let Some((name, gpu)) = &opened {
+            next = with_adapter(gpu, name, request, &requests, &mut to)?;
+        }
+    }
+    Ok(())
+}
+
+/// The requests that arrive, and whether one is being answered.
+struct Requests {
+    receive: mpsc::Receiver<Request>,
+    busy: Arc<AtomicBool>,
+}
+
+impl Requests {
+    fn next(&self) -> Option<Request> {
+        self.busy.store(false, Ordering::SeqCst);
+        self.receive.recv().ok()
+    }
+}
+
+/// Reads requests on a thread of its own. When there are no more while one is being answered, whoever asked has gone
+/// away, and nothing else would end a driver that hangs.
+fn requests(mut from: impl Read + Send + 'static) -> Requests {
+    let (send, receive) = mpsc::channel();
+    let busy = Arc::new(AtomicBool::new(false));
+    let answering = busy.clone();
+    std::thread::spawn(move || {
+        while let Ok(request) = read_message::<Request>(&mut from) {
+            answering.store(true, Ordering::SeqCst);
+            if send.send(request).is_err() {
+                return;
+            }
+        }
+        if answering.load(Ordering::SeqCst) {
+            std::process::abort();
+        }
+    });
+    Requests { receive, busy }
+}
+
+/// Answers requests for one adapter; gives the first that is for another.
+fn with_adapter(
+    gpu: &Gpu,
+    name: &Option<String>,
+    first: Request,
+    requests: &Requests,
+    to: &mut impl Write,
+) -> std::io::Result<Option<Request>> {
+    let mut subject: Option<Loaded<'_>> = None;
+    let mut next = Some(first);
+    while let Some(request) = next.take() {
+        if request.adapter != *name {
+            return Ok(Some(request));
+        }
+        match answer(gpu, &mut subject, &request) {
+            Ok((answer, numbers)) => {
+                write_message(to, &answer)?;
+                write_numbers(to, &numbers)?;
+                to.flush()?;
+            }
+            Err(error) => refuse(to, *error)?,
+        }
+        next = requests.next();
+    }
+    Ok(None)
+}
+
+fn refuse(to: &mut impl Write, error: Diagnostic) -> std::io::Result<()> {
+    write_message(to, &Answer::Refused(Said::of(error)))?;
+    write_numbers(to, &[])?;
+    to.flush()
+}
+
+/// A scene that was read, with what was compiled for it.
+struct Loaded<'g> {
+    subject: Subject,
+    source: Source,
+    scene: Scene,
+    renderer: Renderer<'g>,
+    /// The last one that was used is the last one here.
+    pipelines: Vec<(Variant, Pipeline)>,
+}
+
+impl<'g> Loaded<'g> {
+    fn new(gpu: &'g Gpu, subject: &Subject) -> Result<Self> {
+        let modules = subject.modules()?;
+        let source = Source::read_with(&subject.shader, &subject.stages(), &modules)?;
+        Ok(Self {
+            scene: Scene::read(&source, subject.scene.as_deref())?,
+            subject: subject.clone(),
+            source,
+            renderer: Renderer::new(gpu),
+            pipelines: Vec::new(),
+        })
+    }
+
+    /// Has the pipeline of a variant as the last one.
+    fn compile(&mut self, variant: &Variant) -> Result<()> {
+        let known = self.pipelines.iter().position(|(v, _)| v == variant);
+        let entry = match known {
+            Some(at) => self.pipelines.remove(at),
+            None => {
+                let text = match &variant.text {
+                    Some(text) => Some(Source::parse("variant.wgsl", &**text)?),
+                    None => None,
+                };
+                let source = text.as_ref().unwrap_or(&self.source);
+                let stages = Stages::of_source(source, &self.scene).ok_or_else(|| {
+                    Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
+                        .with_note("give it the vertex entry point of the shader")
+                })?;
+                let stages = Stages {
+                    auto_lod: variant.auto_lod,
+                    ..stages
+                };
+                let pipeline = self.renderer.pipeline(stages, &self.scene)?;
+                (variant.clone(), pipeline)
+            }
+        };
+        self.pipelines.push(entry);
+        if self.pipelines.len() > KEPT {
+            self.pipelines.remove(0);
+        }
+        Ok(())
+    }
+}
+
+fn answer<'g>(
+    gpu: &'g Gpu,
+    subject: &mut Option<Loaded<'g>>,
+    request: &Request,
+) -> Result<(Answer, Vec<f32>)> {
+    let mut loaded = match subject.take() {
+        Some(loaded) if loaded.subject == request.subject => loaded,
+        _ => Loaded::new(gpu, &request.subject)?,
+    };
+    let drawn = draw(gpu, &mut loaded, request);
+    *subject = Some(loaded);
+    drawn
+}
+
+fn draw(gpu: &Gpu, loaded: &mut Loaded<'_>, request: &Request) -> Result<(Answer, Vec<f32>)> {
+    loaded.compile(&request.variant)?;
+    let wanted = request.wanted;
+    let mut frames = loaded.scene.frames(wanted.distance).into_iter();
+    let Some(mut frame) = frames.nth(wanted.frame) else {
+        return Err(Diagnostic::error(format!(
+            "the scene has no picture {} at a distance of {}",
+            wanted.frame, wanted.distance
+        )));
+    };
+    frame.offset = wanted.offset;
+    frame.grid = wanted.grid;
+    let Some((_, pipeline)) = loaded.pipelines.last() else {
+        return Err(Diagnostic::error("nothing was compiled"));
+    };
+    let drawn = loaded.renderer.draw(pipeline, &loaded.scene, &frame)?;
+    let picture = drawn.picture(gpu)?;
+    let mut numbers = picture.pixels.as_flattened().to_vec();
+    numbers.extend(&picture.covered);
+    let answer = Answer::Picture {
+        width: picture.width,
+        height: picture.height,
+    };
+    Ok((answer, numbers))
+}
