@@ -3,7 +3,8 @@
 //! The child is the same command. What it prints goes through; between, it prints a byte 0 whenever it goes on, which the
 //! parent takes out. A child that has been silent for too long is ended.
 
-use crate::{Diagnostic, Result};
+use crate::Result;
+use crate::gpu::worker::Failure;
 use std::ffi::OsString;
 use std::io::{Read, Write};
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -38,27 +39,27 @@ pub(super) fn goes_on() {
 /// # Errors
 /// When the child crashes, or is silent for too long.
 pub(super) fn run(arguments: &[OsString], adapter: Option<&str>) -> Result<ExitCode> {
-    let program = std::env::current_exe().map_err(|error| not_started(&error))?;
-    let mut command = Command::new(program);
-    command.args(arguments.iter().skip(1)).env(CHILD, "1");
-    let code = watch(&mut command, PATIENCE, adapter, &mut std::io::stdout())?;
+    let code = std::env::current_exe()
+        .map_err(|error| not_started(&error))
+        .and_then(|program| {
+            let mut command = Command::new(program);
+            command.args(arguments.iter().skip(1)).env(CHILD, "1");
+            watch(&mut command, PATIENCE, &mut std::io::stdout())
+        });
+    let code = code.map_err(|failure| failure.diagnostic(adapter))?;
     Ok(ExitCode::from(code))
 }
 
-fn not_started(error: &dyn std::fmt::Display) -> Box<Diagnostic> {
-    Diagnostic::error("the process that draws on the GPU cannot be started")
-        .with_reason(error)
-        .with_note("it is lodc itself: is its file still where it was started from?")
+fn not_started(error: &std::io::Error) -> Failure {
+    Failure::NotStarted(error.to_string())
 }
 
 /// Runs a child and passes on to `out` what it prints; its exit code.
 fn watch(
     command: &mut Command,
     patience: Duration,
-    adapter: Option<&str>,
     out: &mut dyn Write,
-) -> Result<u8> {
-    let adapter = adapter.map_or(String::new(), |name| format!(" on `{name}`"));
+) -> std::result::Result<u8, Failure> {
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -85,12 +86,7 @@ fn watch(
             Err(RecvTimeoutError::Disconnected) => break,
             Err(RecvTimeoutError::Timeout) => {
                 end(&mut child);
-                return Err(Diagnostic::error(format!(
-                    "drawing{adapter} did not go on for {} seconds",
-                    patience.as_secs_f64()
-                ))
-                .with_reason("a shader never ends there, or the driver hangs")
-                .with_note("look for a loop whose end depends on a value that never comes, or draw with another adapter: `--adapter`"));
+                return Err(Failure::Hung(patience));
             }
         }
     }
@@ -98,13 +94,11 @@ fn watch(
     match status.code() {
         // It has said what is wrong.
         Some(code @ 0..=2) => Ok(code as u8),
-        _ => Err(
-            Diagnostic::error(format!("the driver crashed while drawing{adapter}"))
-                .with_reason(status)
-                .with_note(
-                    "another adapter may draw it, with `--adapter`; the evaluator needs none",
-                ),
-        ),
+        // What the driver printed has gone to standard error.
+        _ => Err(Failure::Crashed {
+            status: status.to_string(),
+            said: String::new(),
+        }),
     }
 }
 
@@ -120,17 +114,11 @@ mod tests {
     use super::*;
 
     /// What becomes of a child that runs a line of shell, and what is passed on of what it prints.
-    fn watched(line: &str) -> (Result<u8>, Vec<u8>) {
+    fn watched(line: &str) -> (std::result::Result<u8, Failure>, Vec<u8>) {
         let mut out = Vec::new();
         let mut command = Command::new("sh");
         let patience = Duration::from_secs(3);
-        let code = watch(
-            command.args(["-c", line]),
-            patience,
-            Some("a GPU"),
-            &mut out,
-        );
-        (code, out)
+        (watch(command.args(["-c", line]), patience, &mut out), out)
     }
 
     #[test]
@@ -148,14 +136,8 @@ mod tests {
     #[test]
     fn a_crash_and_a_hang_are_errors() {
         let crashed = watched("kill -SEGV $$").0.unwrap_err();
-        assert!(
-            crashed.message.contains("crashed while drawing on `a GPU`"),
-            "{crashed}"
-        );
+        assert!(matches!(crashed, Failure::Crashed { .. }), "{crashed:?}");
         let hung = watched("exec sleep 60").0.unwrap_err();
-        assert!(
-            hung.message.contains("did not go on for 3 seconds"),
-            "{hung}"
-        );
+        assert!(matches!(hung, Failure::Hung(_)), "{hung:?}");
     }
 }

@@ -122,7 +122,7 @@ pub fn compare(request: &CompareRequest, goes_on: &dyn Fn()) -> Result<Compared>
     Ok(Compared {
         comparison: comparison(request, (&a, &b), adapter, distances, &warnings),
         files,
-        warnings,
+        warnings: warnings.into_iter().map(Box::new).collect(),
     })
 }
 
@@ -143,8 +143,8 @@ enum Judge<'a> {
     },
     #[cfg(feature = "gpu")]
     Gpu {
-        device: Device<'a>,
-        original: Compiled<'a>,
+        device: Box<Device<'a>>,
+        original: Box<Compiled<'a>>,
     },
 }
 
@@ -161,9 +161,12 @@ impl<'a> Judge<'a> {
 
     #[cfg(feature = "gpu")]
     fn gpu(gpu: &'a Gpu, a: &'a Ready) -> Result<Self> {
-        let device = Device::new(gpu)?;
+        let device = Box::new(Device::new(gpu)?);
         let original = device.compile(stages(&a.source, &a.scene)?, &a.scene)?;
-        Ok(Self::Gpu { device, original })
+        Ok(Self::Gpu {
+            device,
+            original: Box::new(original),
+        })
     }
 
     /// The adapter's label, where there is one.
@@ -200,7 +203,7 @@ impl<'a> Judge<'a> {
             #[cfg(feature = "gpu")]
             Self::Gpu { device, original } => {
                 let other = device.compile(stages(source, scene)?, scene)?;
-                let (error, flip) = device.compare([original, &other], distance, goes_on)?;
+                let (error, flip) = device.compare([&**original, &other], distance, goes_on)?;
                 let pictures = match wants_pictures {
                     true => Some([
                         device.pictures(original, distance, goes_on)?,
@@ -366,11 +369,11 @@ fn apart((a, b): (&[f32; 3], &[f32; 3])) -> [f32; 3] {
 }
 
 /// What should be known of the scenes, each thing once.
-fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Vec<Box<Diagnostic>> {
+fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Vec<Diagnostic> {
     let mut said = BTreeSet::new();
     let all = a.warnings.iter().chain(&b.warnings);
     let once = all.filter(|warning| said.insert(&warning.message));
-    let mut warnings: Vec<_> = once.cloned().map(Box::new).collect();
+    let mut warnings: Vec<_> = once.cloned().collect();
     if request.autolod.is_some() && !chooses {
         let other = request.other.display();
         let does = match request.at.as_slice() {
@@ -378,7 +381,7 @@ fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Ve
             _ => "it changes nothing",
         };
         warnings.push(
-            Diagnostic::warning(format!("`{other}` declares no `{AUTO_LOD}`: {does}"))
+            *Diagnostic::warning(format!("`{other}` declares no `{AUTO_LOD}`: {does}"))
                 .with_note("a shader that lodc emitted has one, unless it has the form `files`"),
         );
     }
@@ -390,7 +393,7 @@ fn comparison(
     (a, b): (&Ready, &Ready),
     adapter: Option<String>,
     distances: Vec<ComparedAt>,
-    warnings: &[Box<Diagnostic>],
+    warnings: &[Diagnostic],
 ) -> Comparison {
     let mut inputs: Vec<Input> = a.read_files();
     for input in b.read_files() {
