@@ -9,6 +9,7 @@
 //! // facts: fs_main.size min 0.5 max 0.9 mean 0.7      one number for all components, or one for each
 //! // facts: fs_main.rare unseen                          or count 16: by fewer samples than others
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
+//! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
 //! ```
 //!
 //! The facts are those of [`synthetic`] otherwise. `LODC_BLESS=1 cargo test --test golden` writes the golden
@@ -127,6 +128,15 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                     *deviation = [0.0; 4];
                 }
             }),
+            ["texture", name, "slopes", ref levels @ ..] => {
+                let slope = |word: &&str| word.parse().ok().map(|number| [number; 2]);
+                let slopes: Option<Vec<_>> = levels.iter().map(slope).collect();
+                facts
+                    .textures
+                    .get_mut(name)
+                    .zip(slopes)
+                    .map(|(texture, slopes)| texture.slopes = slopes)
+            }
             ["dynamic", path] => {
                 facts.dynamic.insert(path.into());
                 Some(())

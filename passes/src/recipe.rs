@@ -148,6 +148,10 @@ pub trait Pass: Sync {
     fn with_numbers(&self, _candidate: &Candidate, _numbers: &[f32]) -> Option<Candidate> {
         None
     }
+    /// Whether the numbers of a candidate are no more than a guess, so that it should be judged by better ones.
+    fn guesses(&self, _candidate: &Candidate) -> bool {
+        false
+    }
     /// Whether a candidate can be applied to a shader.
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined>;
     /// The shader with the change made.

@@ -41,6 +41,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut kept = Vec::new();
     let mut fitted = Vec::new();
     let mut without = Vec::new();
+    let mut widened = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -56,6 +57,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
                 let operand = ValueId::from(operand);
                 fitted.push(format!("{site} fitted to {}", short(operand.path())));
             }
+            Some(("normal-to-roughness", _)) => widened.push(site),
             _ => others.push(format!("{site}: {}", candidate.choice)),
         }
     }
@@ -78,6 +80,12 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     }
     if !without.is_empty() {
         clauses.push(format!("{} left out", listed(&without, "values")));
+    }
+    if !widened.is_empty() {
+        clauses.push(format!(
+            "{} removed, roughness widened",
+            listed(&widened, "normal maps")
+        ));
     }
     match kept.len() {
         0..=2 => clauses.append(&mut kept),
@@ -127,13 +135,18 @@ mod tests {
                 "keep main.specular.pow#0123456789abcdef",
             ),
             candidate("texture-removal", "main.albedo", "texture-mean"),
+            candidate(
+                "texture-removal",
+                "main.detail_normal",
+                "normal-to-roughness main.alpha#0123456789abcdef",
+            ),
             candidate("op-removal", "main.ambient", "without"),
             candidate("op-removal", "main.sky", "best"),
             candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine"
+            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }

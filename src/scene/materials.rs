@@ -404,6 +404,17 @@ impl Role {
             .iter()
             .find(|role| role.names.contains(&said.as_str()))
     }
+
+    /// Whether a texture holds the normals of the surface, by the role that a scene says or else by its name, which may
+    /// say whose normals: `detail_normal`.
+    pub(super) fn is_normals(said: Option<&Self>, name: &str) -> bool {
+        match said.or_else(|| Self::infer(name)) {
+            Some(role) => role.keyword == "normal",
+            None => words(name)
+                .iter()
+                .any(|word| ["normal", "normals", "nrm"].contains(&word.as_str())),
+        }
+    }
 }
 
 impl Factor {
@@ -691,6 +702,23 @@ mod tests {
             ("texture", None),
         ] {
             assert_eq!(Role::infer(name).map(|r| r.keyword), role, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_scene_or_a_name_says_what_holds_normals() {
+        for (said, name, holds) in [
+            (None, "normal_texture", true),
+            (None, "detailNormal", true),
+            (None, "rock_normal_map", true),
+            (None, "clearcoat_normal_texture", false),
+            (None, "abnormality", false),
+            (None, "bumps", false),
+            (Some("normal"), "bumps", true),
+            (Some("occlusion"), "detail_normal", false),
+        ] {
+            let role = said.and_then(Role::of_keyword);
+            assert_eq!(Role::is_normals(role, name), holds, "{said:?} {name}");
         }
     }
 

@@ -31,6 +31,9 @@ pub struct SceneTexture {
     pub images: Vec<Arc<Texture>>,
     /// Nobody knows its image: it is never averaged, baked or removed.
     pub dynamic: bool,
+    /// Of a map of normals, which the scene or its name says that it is, the variance of its slopes at each MIP level
+    /// (see [`Texture::slopes`]); empty for any other texture, and where images differ.
+    pub slopes: Vec<[f32; 2]>,
     /// The files of its image, as the scene names them.
     pub files: Vec<String>,
 }
@@ -261,6 +264,11 @@ pub(super) fn resolve(
             name,
             kind,
         };
+        let role = match entry {
+            Some(entry) => read.role(entry)?.map(|(role, _)| role),
+            None => None,
+        };
+        let normals = !dynamic && kind.is_plain() && Role::is_normals(role, name);
         let (images, files) = match (entry, Role::infer(name), place.model) {
             (Some(entry), ..) if !dynamic => match read.said_role(entry)? {
                 Some((role, space, model)) => read.of_model(role, space, model, &mut found)?,
@@ -284,12 +292,17 @@ pub(super) fn resolve(
                 (vec![Arc::new(placeholder)], Vec::new())
             }
         };
+        let slopes = match &images[..] {
+            [image] if normals => image.slopes(),
+            _ => Vec::new(),
+        };
         found.textures.push(SceneTexture {
             name: name.clone(),
             group: binding.group,
             binding: binding.binding,
             images,
             dynamic,
+            slopes,
             files,
         });
     }
@@ -571,12 +584,8 @@ struct Reader<'r> {
 }
 
 impl<'r> Reader<'r> {
-    /// What `{ role = "..." }` says: the role, the colour space and the model.
-    fn said_role(
-        &self,
-        entry: &Spanned<Node>,
-    ) -> Result<Option<(&'static Role, Space, &'r Model)>> {
-        let toml = self.toml;
+    /// The role that a table says, with or without an image of its own, and where it says so.
+    fn role(&self, entry: &Spanned<Node>) -> Result<Option<(&'static Role, Range<usize>)>> {
         let Node::Table(keys) = entry.get_ref() else {
             return Ok(None);
         };
@@ -592,7 +601,26 @@ impl<'r> Reader<'r> {
         };
         let role = match role {
             Some(role) => role,
-            None => choice(toml, "role", said, &known)?,
+            None => choice(self.toml, "role", said, &known)?,
+        };
+        Ok(Some((role, said.span())))
+    }
+
+    /// What `{ role = "..." }` says of an image of the model's: the role, the colour space and the model.
+    fn said_role(
+        &self,
+        entry: &Spanned<Node>,
+    ) -> Result<Option<(&'static Role, Space, &'r Model)>> {
+        let toml = self.toml;
+        let Node::Table(keys) = entry.get_ref() else {
+            return Ok(None);
+        };
+        let own = ["file", "faces", "layers"];
+        if own.iter().any(|key| keys.get(key).is_some()) {
+            return Ok(None);
+        }
+        let Some((role, span)) = self.role(entry)? else {
+            return Ok(None);
         };
         let mut space = role.space;
         for (key, value) in &keys.0 {
@@ -609,7 +637,7 @@ impl<'r> Reader<'r> {
             return Err(toml
                 .error(
                     format!("`{}` is a {}", self.name, self.kind.name()),
-                    said.span(),
+                    span.clone(),
                     "a material's textures are of the type texture_2d<f32>",
                 )
                 .with_note("give its images, or write `\"dynamic\"`"));
@@ -622,7 +650,7 @@ impl<'r> Reader<'r> {
                         "`{}` is to be a texture of a material, and the object has none",
                         self.name
                     ),
-                    said.span(),
+                    span,
                     "",
                 )
                 .with_note("name a model, `object = \"model.glb\"`, or give a file")),
@@ -742,6 +770,7 @@ impl<'r> Reader<'r> {
         }
         let mut files: Vec<(&str, Range<usize>)> = Vec::new();
         let mut space = None;
+        let mut role = None;
         match entry.get_ref() {
             Node::Text(file) if key == "file" => files.push((file, entry.span())),
             Node::Text(_) => return Err(wrong(entry.span(), "this is one image")),
@@ -784,12 +813,13 @@ impl<'r> Reader<'r> {
                             let wrap = wrap_of(toml, value)?;
                             wraps.insert(name.to_owned(), (wrap, value.span()));
                         }
+                        "role" => role = self.role(entry)?.map(|(role, _)| role),
                         other => {
                             let error = toml.error(format!("unknown key `{other}`"), k.span(), "");
                             return Err(suggest(
                                 error,
                                 other,
-                                &["file", "faces", "layers", "space", "wrap"],
+                                &["file", "faces", "layers", "space", "wrap", "role"],
                             ));
                         }
                     }
@@ -800,6 +830,7 @@ impl<'r> Reader<'r> {
             }
             other => return Err(wrong(entry.span(), &format!("this is {}", other.what()))),
         }
+        let space = space.or(role.map(|role| role.space));
         let space = self.space(space, &files, &mut found.inferences);
         let images = files
             .iter()

@@ -154,7 +154,10 @@ fn texture_facts(
             (
                 texture.name.clone(),
                 match texture.images.as_slice() {
-                    [image] => image.facts(level.max(0.0) as f32, weighed),
+                    [image] => TextureFacts {
+                        slopes: texture.slopes.clone(),
+                        ..image.facts(level.max(0.0) as f32, weighed)
+                    },
                     // Draws with different images share no mean; what the samples see of them does.
                     _ => TextureFacts::default(),
                 },
@@ -224,4 +227,92 @@ fn float_values(shader: &Shader) -> Vec<Handle<Expression>> {
             )
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::normal_form;
+    use crate::front::Source;
+    use crate::search::best::best;
+    use crate::search::interval::Interval;
+    use crate::search::{Samples, Stand};
+    use lodc_passes::recipe;
+    use std::path::Path;
+
+    /// What `seen-mean` and `normal-to-roughness` of the normals of a material add to its squared error, each as it is
+    /// listed and with its best numbers.
+    fn added(material: &Path, scene: &str, part: f64) -> [[f64; 2]; 2] {
+        let source = Source::read(material).expect("it parses");
+        let path = material.with_extension("toml");
+        let scene = Scene::resolve(&source, Some((&path, scene))).unwrap_or_else(|e| panic!("{e}"));
+        let base = normal_form(&source).expect("it is small");
+        let vertex = base.index(Stage::Vertex).expect("it has one");
+        let vertex = Program::compile(base.module(), vertex, &[]).expect("it runs");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let distance = scene.nearest * (scene.farthest / scene.nearest).powf(part);
+        let interval = Interval::new(&stand, &[distance], Samples::Full).expect("it runs");
+        let facts = interval.start().facts(&base);
+        let floor = interval.start().original().error.square();
+        let candidates = recipe::candidates(&base, &facts);
+        let mut all = candidates.iter();
+        let widening = all.find(|candidate| candidate.choice.starts_with("normal-to-roughness"));
+        let widening = widening.expect("the roughness is known");
+        let mean = candidates
+            .iter()
+            .find(|candidate| candidate.choice == "seen-mean" && candidate.site == widening.site);
+        [mean.expect("the mean is seen"), widening].map(|candidate| {
+            let shader = recipe::apply(&base, candidate).expect("it applies");
+            let listed = interval.measure(&shader).expect("it runs");
+            let better = best(&interval, &base, candidate, &listed);
+            let better = better.map_or(listed, |better| better.measured);
+            let added = [listed, better].map(|measured| measured.error.square() - floor);
+            eprintln!(
+                "{candidate}: {floor:.3e} and {:+.3e}, best {:+.3e}",
+                added[0], added[1]
+            );
+            added
+        })
+    }
+
+    #[test]
+    fn a_roughness_that_takes_up_the_slopes_leaves_less_error_than_a_mean_normal() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        for material in ["pbr", "gltf_pbr"] {
+            let path = folder.join(material).with_extension("wgsl");
+            let scene = std::fs::read_to_string(path.with_extension("toml")).expect("it is there");
+            // A rough surface, so that there are slopes in all directions.
+            let scene = scene.replace("panel_normal", "rock_normal");
+            let lines = scene
+                .lines()
+                .map(|line| match line.starts_with("resolution") {
+                    true => "resolution = [96, 96]",
+                    false => line,
+                });
+            let scene: Vec<&str> = lines.collect();
+            let [mean, widened] = added(&path, &scene.join("\n"), 0.5);
+            assert!(widened[1] < mean[1].min(mean[0]), "{mean:?} {widened:?}");
+        }
+    }
+
+    #[test]
+    fn a_roughness_takes_up_the_slopes_of_a_model() {
+        let data = std::env::var_os("LODC_DATA").map(std::path::PathBuf::from);
+        let data =
+            data.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"));
+        let bottle = data.join("WaterBottle/WaterBottle.gltf");
+        if !bottle.exists() {
+            eprintln!("SKIPPED: there is no {}", bottle.display());
+            return;
+        }
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let scene =
+            format!("object = {bottle:?}\nresolution = [96, 96]\nviews = {{ count = 2 }}\n");
+        let [mean, widened] = added(&folder.join("gltf_pbr.wgsl"), &scene, 0.5);
+        assert!(widened[1] < mean[1].min(mean[0]), "{mean:?} {widened:?}");
+    }
 }

@@ -239,21 +239,32 @@ impl Step<'_> {
         over: &mut BTreeSet<Key>,
         frontier: &mut Frontier,
     ) {
-        let results: Vec<Option<(Fingerprint, Measured)>> = batch
+        let results: Vec<Option<(Fingerprint, Measured, Option<Candidate>)>> = batch
             .par_iter()
             .map(|i| {
-                let shader = recipe::apply(&self.current.shader, &self.candidates[*i]).ok()?;
+                let candidate = &self.candidates[*i];
+                let shader = recipe::apply(&self.current.shader, candidate).ok()?;
                 let fingerprint = shader.fingerprint();
                 let measured = match self.tried.get(&fingerprint) {
                     Some(measured) => *measured,
                     None => descent.interval.measure(&shader).ok()?,
                 };
-                Some((fingerprint, measured))
+                if recipe::pass(&candidate.pass).is_ok_and(|pass| pass.guesses(candidate))
+                    && let Some(better) =
+                        best(descent.interval, &self.current.shader, candidate, &measured)
+                {
+                    let fingerprint = better.shader.fingerprint();
+                    return Some((fingerprint, better.measured, Some(better.candidate)));
+                }
+                Some((fingerprint, measured, None))
             })
             .collect();
         for (i, result) in batch.iter().copied().zip(results) {
             let mut price = None;
-            if let Some((fingerprint, measured)) = result {
+            if let Some((fingerprint, measured, better)) = result {
+                if let Some(better) = better {
+                    self.candidates[i] = better;
+                }
                 price = Price::of(&self.current.measured, &measured);
                 self.tried.insert(fingerprint, measured);
                 self.fresh[i] = Some(measured);

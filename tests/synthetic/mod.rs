@@ -64,6 +64,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
                         [0.125, 0.125, 0.125, 0.0],
                         [0.0; 4],
                     ],
+                    slopes: Vec::new(),
                     level: 0.5,
                 },
             );

@@ -9,7 +9,7 @@ use naga::{AddressSpace, Block, Expression, Statement, TypeInner};
 pub(crate) struct Dynamic(Vec<u64>);
 
 impl Dynamic {
-    /// Reads it off a function, through local variables and the conditions around their stores.
+    /// Reads it off a function.
     pub(crate) fn of(flow: &Flow, facts: &Facts) -> Self {
         let mut sources: Vec<String> = Vec::new();
         let mut own = vec![0; flow.function.expressions.len()];
@@ -30,27 +30,10 @@ impl Dynamic {
                 own[value.index()] = 1 << at.min(63);
             }
         }
-        let mut of = vec![0; own.len()];
-        if sources.is_empty() {
-            return Self(of);
-        }
-        let mut locals = vec![0; flow.function.local_variables.len()];
-        // What a loop stores reaches the loads above it in another round; bits are only ever added.
-        loop {
-            for (value, expression) in flow.function.expressions.iter() {
-                let mut bits = own[value.index()];
-                operands::each(expression, |operand| bits |= of[operand.index()]);
-                if let Expression::LocalVariable(local) = *expression {
-                    bits |= locals[local.index()];
-                }
-                of[value.index()] = bits;
-            }
-            let before = locals.clone();
-            stores(flow, &flow.function.body, 0, &of, &mut locals);
-            if locals == before {
-                return Self(of);
-            }
-        }
+        Self(match sources.is_empty() {
+            true => own,
+            false => flow.spread(&own),
+        })
     }
 
     /// Whether a value depends on something that may take any value.
@@ -85,6 +68,29 @@ fn stores(flow: &Flow, block: &Block, around: u64, of: &[u64], locals: &mut [u64
 }
 
 impl Flow<'_> {
+    /// For each value, the bits of all values that it depends on, through local variables and the conditions around
+    /// their stores.
+    pub(crate) fn spread(&self, own: &[u64]) -> Vec<u64> {
+        let mut of = vec![0; own.len()];
+        let mut locals = vec![0; self.function.local_variables.len()];
+        // What a loop stores reaches the loads above it in another round; bits are only ever added.
+        loop {
+            for (value, expression) in self.function.expressions.iter() {
+                let mut bits = own[value.index()];
+                operands::each(expression, |operand| bits |= of[operand.index()]);
+                if let Expression::LocalVariable(local) = *expression {
+                    bits |= locals[local.index()];
+                }
+                of[value.index()] = bits;
+            }
+            let before = locals.clone();
+            stores(self, &self.function.body, 0, &of, &mut locals);
+            if locals == before {
+                return of;
+            }
+        }
+    }
+
     /// The dynamic uniform that a pointer leads to, or to a part of, or that is a part of what it leads to.
     fn dynamic_uniform(&self, pointer: Value, facts: &Facts) -> Option<String> {
         if facts.dynamic.is_empty() {

@@ -137,6 +137,66 @@ mod tests {
         assert_eq!(facts.level, 1.5);
     }
 
+    /// A map of normals of one row.
+    fn normals(normals: &[[f32; 3]]) -> Texture {
+        let texel = |n: &[f32; 3]| [0, 1, 2, 3].map(|i| n.get(i).map_or(1.0, |x| 0.5 * x + 0.5));
+        let image = Image {
+            width: normals.len() as u32,
+            height: 1,
+            texels: normals.iter().map(texel).collect(),
+        };
+        chain(Dimension::D2, vec![image])
+    }
+
+    #[test]
+    fn slopes_of_known_normals() {
+        // Slopes of 3/4, -3/4, 5/12 and -5/12 across, and none along.
+        let slopes = normals(&[
+            [0.6, 0.0, 0.8],
+            [-0.6, 0.0, 0.8],
+            [5.0 / 13.0, 0.0, 12.0 / 13.0],
+            [-5.0 / 13.0, 0.0, 12.0 / 13.0],
+        ])
+        .slopes();
+        let close = |a: f32, b: f32| assert!((a - b).abs() < 1e-6, "{a} {b}");
+        assert_eq!(slopes.len(), 3);
+        close(slopes[0][0], (9.0 / 16.0 + 25.0 / 144.0) / 2.0);
+        close(slopes[0][1], 0.0);
+        // Each pair levels out.
+        close(slopes[1][0], 0.0);
+        // Slopes of 3/4 and -5/12: half of what is between them, squared. What they have in common does not count.
+        let leaning = normals(&[[0.0, 0.6, 0.8], [0.0, -5.0 / 13.0, 12.0 / 13.0]]).slopes();
+        close(leaning[0][1], ((3.0 / 4.0 + 5.0 / 12.0) / 2.0_f32).powi(2));
+        assert_eq!(leaning[1], [0.0; 2]);
+    }
+
+    #[test]
+    fn slopes_of_two_channels_and_of_what_is_no_normal() {
+        for third in [-1.0, 1.0] {
+            let slopes = normals(&[[0.6, 0.0, third], [-0.6, 0.0, third]]).slopes();
+            assert!(
+                (slopes[0][0] - 9.0 / 16.0).abs() < 1e-6,
+                "{third}: {slopes:?}"
+            );
+        }
+        // A steep slope is cut off.
+        let steep = normals(&[
+            [1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, 1.0],
+        ]);
+        assert_eq!(steep.slopes()[0][0], 3.0 / 16.0);
+        // In all directions, as in a map of normals in the space of an object.
+        assert!(
+            normals(&[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+                .slopes()
+                .is_empty()
+        );
+        let slices = vec![grey(1, 1, |_, _| 0.5); 2];
+        assert!(chain(Dimension::D3, slices).slopes().is_empty());
+    }
+
     #[test]
     fn means_are_weighed_by_alpha_where_it_is_what_is_seen() {
         // 4 x 4 texels: a column of red that is opaque, one of 0.5 half seen, and two of white that are not.

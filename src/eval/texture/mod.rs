@@ -231,9 +231,32 @@ impl Texture {
             mean,
             deviation,
             level,
+            ..TextureFacts::default()
+        }
+    }
+
+    /// The variance of the slopes of every MIP level, along each axis, where texels are normals in tangent space: `2 t - 1`
+    /// for each channel. A slope of more than 1 counts as 1. A third channel that is the same everywhere is none, and z follows from the first two. Nothing
+    /// for what is no such map, because it has more than one layer or points into the surface as often as away from it.
+    pub fn slopes(&self) -> Vec<[f32; 2]> {
+        let finest = &self.levels[0];
+        let z = |texel: &[f32; 4]| f64::from(texel[2]) * 2.0 - 1.0;
+        let first = finest.texels.first().map_or(0.0, |texel| texel[2]);
+        let two_channels = finest.texels.iter().all(|texel| texel[2] == first);
+        let mean = finest.texels.iter().map(z).sum::<f64>() / finest.texels.len() as f64;
+        let outwards = two_channels || mean > LEAST_MEAN_Z;
+        match self.dimension == Dimension::D2 && self.layers() == 1 && outwards {
+            true => {
+                let levels = self.levels.iter();
+                levels.map(|level| level.slopes(two_channels)).collect()
+            }
+            false => Vec::new(),
         }
     }
 }
+
+/// The least mean of the third component of normals in tangent space; of normals in all directions it is 0.
+const LEAST_MEAN_Z: f64 = 0.5;
 
 impl Level {
     /// The mean and the standard deviation of its texels; colours weighed by alpha where that is wanted, and any texel
@@ -270,5 +293,35 @@ impl Level {
             mean.map(|m| m as f32),
             std::array::from_fn(|c| (variance[c] / whole[c]).sqrt() as f32),
         )
+    }
+
+    /// The variance of the slopes of its normals along each axis, summed in f64 in the order of the texels.
+    fn slopes(&self, two_channels: bool) -> [f32; 2] {
+        let count = self.texels.len() as f64;
+        let slopes = || {
+            self.texels.iter().map(|texel| {
+                let [x, y, z] = [0, 1, 2].map(|i| f64::from(texel[i]) * 2.0 - 1.0);
+                let z = match two_channels {
+                    true => (1.0 - x * x - y * y).max(0.0).sqrt(),
+                    false => z,
+                };
+                // One of 1 is all that the widest lobe has, and few steeper ones are seen from above.
+                let length = x.hypot(y).max(1e-6);
+                [x, y].map(|component| component / z.max(length))
+            })
+        };
+        let mut mean = [0.0; 2];
+        for slope in slopes() {
+            for i in 0..2 {
+                mean[i] += slope[i] / count;
+            }
+        }
+        let mut variance = [0.0; 2];
+        for slope in slopes() {
+            for i in 0..2 {
+                variance[i] += (slope[i] - mean[i]).powi(2) / count;
+            }
+        }
+        variance.map(|variance| variance as f32)
     }
 }

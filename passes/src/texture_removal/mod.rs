@@ -12,6 +12,16 @@
 //! more, where each removal alone would still pay for the others; `seen-mean` is then the mean over all
 //! reads. The variable's own id is the site, such as `fs_main.albedo_texture`.
 //!
+//! `normal-to-roughness <alpha's ids>`, for a map of normals whose role is known: the reads become their `seen-mean`, and
+//! the roughness takes up the slopes that go with them. What uses alpha, the square of perceptual roughness, uses
+//! `sqrt(min(alpha * alpha + v, 1.0))`. The candidate bakes `v` and behind it the constant. `roughness.rs` says how alpha
+//! is found and why variances add. MIP levels lose the part of the variance that is within a pixel (Toksvig measures it
+//! by how short a mean normal is); but here the whole map goes, and a pixel no longer knows where on the map it is, so
+//! that the variance between pixels goes with it: `v` is that of all slopes that the reference shows. What is lost in
+//! the MIP levels that the reference reads, the reference has lost too. That is a first guess: few maps have slopes
+//! like those of a microfacet, most are flat with some steep edges, which a lobe had better not follow; and a
+//! shader may scale its normals. So a search judges this choice by its best numbers.
+//!
 //! Error. For `texture-mean`, the least-squares error of the constant at that MIP level is the standard
 //! deviation of the texels: [`deviation`] gives it. Its effect on the picture is measured. `only-colour`
 //! is lossless.
@@ -26,14 +36,21 @@
 //! - A read that decides when a loop ends (unless a counter of integers ends it anyway), a built-in
 //!   output or what is written to memory.
 //! - A read that no sample saw, for `seen-mean`.
+//! - `normal-to-roughness` where alpha is not known for sure or seen above 1, where it and the normals are not two
+//!   things that meet further on, where it decides more than the picture, and for normals that do not vary. It is not
+//!   thought of for other textures.
 //!
 //! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail",
-//! 2003, section 2.1.
+//! 2003, section 2.1; Michael Toksvig, "Mipmapping Normal Maps", 2005; Marc Olano, Dan Baker, "LEAN Mapping", 2010,
+//! section 3.
+
+mod roughness;
 
 use crate::edit::{Edit, New};
+use crate::facts::TextureFacts;
 use crate::flow::{Dynamic, Flow, Value};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
-use crate::shader::{Shader, Stage};
+use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, constants};
 use naga::{Expression, GlobalVariable, Handle};
 
@@ -50,21 +67,26 @@ enum Choice {
     TextureMean,
     Best,
     OnlyColour,
+    NormalToRoughness,
 }
 
 impl Choice {
-    const ALL: [(Self, &'static str); 4] = [
+    const ALL: [(Self, &'static str); 5] = [
         (Self::SeenMean, "seen-mean"),
         (Self::TextureMean, "texture-mean"),
         (Self::Best, "best"),
         (Self::OnlyColour, "only-colour"),
+        (Self::NormalToRoughness, "normal-to-roughness"),
     ];
 
-    fn parse(choice: &str) -> Result<Self, Declined> {
+    /// A choice, and the ids of values that stand behind it.
+    fn parse(choice: &str) -> Result<(Self, &str), Declined> {
+        let (word, ids) = choice.split_once(' ').unwrap_or((choice, ""));
         Self::ALL
             .iter()
-            .find(|(_, word)| *word == choice)
-            .map(|(parsed, _)| *parsed)
+            .find(|(_, known)| *known == word)
+            .map(|(parsed, _)| (*parsed, ids))
+            .filter(|(parsed, ids)| *parsed == Self::NormalToRoughness || ids.is_empty())
             .ok_or_else(|| Declined(format!("texture-removal has no choice `{choice}`")))
     }
 
@@ -83,8 +105,8 @@ pub fn deviation(shader: &Shader, facts: &Facts, candidate: &Candidate) -> Optio
     if candidate.pass != TextureRemoval.name() {
         return None;
     }
-    match Choice::parse(&candidate.choice).ok()? {
-        Choice::SeenMean | Choice::Best => None,
+    match Choice::parse(&candidate.choice).ok()?.0 {
+        Choice::SeenMean | Choice::Best | Choice::NormalToRoughness => None,
         Choice::OnlyColour => Some([0.0; 4]),
         Choice::TextureMean => {
             let (stage, site) = shader.find(&candidate.site)?;
@@ -109,7 +131,7 @@ impl Pass for TextureRemoval {
 
     fn class(&self, candidate: &Candidate) -> Class {
         match Choice::parse(&candidate.choice) {
-            Ok(Choice::OnlyColour) => Class::Lossless,
+            Ok((Choice::OnlyColour, _)) => Class::Lossless,
             _ => Class::Lossy,
         }
     }
@@ -145,10 +167,22 @@ impl Pass for TextureRemoval {
     }
 
     fn with_numbers(&self, candidate: &Candidate, numbers: &[f32]) -> Option<Candidate> {
-        match Choice::parse(&candidate.choice).ok()? {
+        match Choice::parse(&candidate.choice).ok()?.0 {
             Choice::OnlyColour => None,
+            Choice::NormalToRoughness => {
+                // A variance is not negative, whatever suits the picture.
+                let mut numbers = numbers.to_vec();
+                let variance = numbers.first_mut()?;
+                *variance = variance.max(0.0);
+                Some(candidate.with(&candidate.choice, &numbers))
+            }
             _ => Some(candidate.with(Choice::Best.word(), numbers)),
         }
+    }
+
+    fn guesses(&self, candidate: &Candidate) -> bool {
+        let choice = Choice::parse(&candidate.choice);
+        choice.is_ok_and(|(choice, _)| choice == Choice::NormalToRoughness)
     }
 
     fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
@@ -157,10 +191,13 @@ impl Pass for TextureRemoval {
 
     fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader {
         match plan(shader, candidate) {
-            Ok((reads, numbers)) => {
+            Ok(plan) => {
                 let mut edit = Edit::new(shader, STAGE);
-                for read in reads {
-                    edit.replace(read, New::Numbers(numbers.clone()));
+                for read in plan.reads {
+                    edit.replace(read, New::Numbers(plan.numbers.clone()));
+                }
+                for alpha in plan.alphas {
+                    roughness::widen(&mut edit, shader, alpha, plan.variance);
                 }
                 edit.finish()
             }
@@ -169,9 +206,20 @@ impl Pass for TextureRemoval {
     }
 }
 
-/// The reads that a candidate removes, and the constant that they become.
-fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Vec<Value>, Vec<f32>), Declined> {
-    let choice = Choice::parse(&candidate.choice)?;
+/// What a candidate does.
+struct Plan {
+    /// What it removes.
+    reads: Vec<Value>,
+    /// The constant that these become.
+    numbers: Vec<f32>,
+    /// What it widens.
+    alphas: Vec<Value>,
+    /// By how much.
+    variance: f32,
+}
+
+fn plan(shader: &Shader, candidate: &Candidate) -> Result<Plan, Declined> {
+    let (choice, ids) = Choice::parse(&candidate.choice)?;
     let (stage, site) = shader
         .find(&candidate.site)
         .ok_or_else(|| Declined(format!("there is no value `{}`", candidate.site.path())))?;
@@ -188,9 +236,25 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<(Vec<Value>, Vec<f32>)
             ));
         }
     };
-    let numbers = candidate.baked(removable(&flow, &reads, choice)?)?;
+    let count = removable(&flow, &reads, choice)?;
+    let (alphas, mut numbers) = match choice {
+        Choice::NormalToRoughness => (roughness::named(&flow, ids)?, candidate.baked(1 + count)?),
+        _ => (Vec::new(), candidate.baked(count)?),
+    };
+    let variance = match choice {
+        Choice::NormalToRoughness => numbers.remove(0),
+        _ => 0.0,
+    };
+    if variance < 0.0 {
+        return Err(Declined("a variance is not negative".into()));
+    }
     follow(&flow, &reads, &numbers)?;
-    Ok((reads, numbers))
+    Ok(Plan {
+        reads,
+        numbers,
+        alphas,
+        variance,
+    })
 }
 
 /// Declines a constant that an operation on the reads cannot take.
@@ -298,49 +362,95 @@ impl Survey<'_> {
         } else {
             Choice::TextureMean
         };
-        for choice in [Choice::SeenMean, of_texture] {
-            let verdict = removable(self.flow, reads, choice).and_then(|count| {
-                let known = known.ok_or_else(|| {
-                    Declined("its texture has no image, so it may hold anything".into())
-                })?;
-                let mean = match choice {
-                    Choice::SeenMean => {
-                        if reads.iter().any(|read| self.dynamic.is(*read)) {
-                            return Err(Declined(
-                                "where it is read depends on something that may take any value"
-                                    .into(),
-                            ));
-                        }
-                        let ids = reads.iter().map(|read| self.flow.id(*read));
-                        self.facts.mean(ids, count)?
-                    }
-                    _ => known.mean_at_level()?[..count].to_vec(),
-                };
-                follow(self.flow, reads, &mean)?;
-                Ok(mean)
-            });
+        let mut consider = |choice: &str, verdict: Result<Vec<f32>, Declined>| {
             let (value, declined) = match verdict {
-                Ok(mean) => (mean.iter().map(|number| number.to_bits()).collect(), None),
+                Ok(numbers) => (numbers.iter().map(|n| n.to_bits()).collect(), None),
                 Err(declined) => (Vec::new(), Some(declined)),
             };
             let candidate = Candidate {
                 pass: TextureRemoval.name().into(),
                 site: self.flow.id(site).clone(),
-                choice: choice.word().into(),
+                choice: choice.into(),
                 value,
             };
             found.push(Considered {
                 candidate,
                 declined,
             });
+        };
+        for choice in [Choice::SeenMean, of_texture] {
+            consider(choice.word(), self.mean(choice, known, reads));
         }
+        // The slopes of a map that is read in several places go once.
+        let all =
+            texture.is_some_and(|texture| reads.len() == self::reads(self.flow, texture).len());
+        if let (Some(known), true) = (known.filter(|known| !known.slopes.is_empty()), all) {
+            let word = Choice::NormalToRoughness.word();
+            match self.widening(known, reads) {
+                Ok((alphas, numbers)) => consider(&format!("{word}{alphas}"), Ok(numbers)),
+                Err(declined) => consider(word, Err(declined)),
+            }
+        }
+    }
+
+    /// The mean that takes the place of reads.
+    fn mean(
+        &self,
+        choice: Choice,
+        known: Option<&TextureFacts>,
+        reads: &[Value],
+    ) -> Result<Vec<f32>, Declined> {
+        let count = removable(self.flow, reads, choice)?;
+        let known = known
+            .ok_or_else(|| Declined("its texture has no image, so it may hold anything".into()))?;
+        let mean = match choice {
+            Choice::TextureMean | Choice::OnlyColour => known.mean_at_level()?[..count].to_vec(),
+            _ => {
+                if reads.iter().any(|read| self.dynamic.is(*read)) {
+                    return Err(Declined(
+                        "where it is read depends on something that may take any value".into(),
+                    ));
+                }
+                let ids = reads.iter().map(|read| self.flow.id(*read));
+                self.facts.mean(ids, count)?
+            }
+        };
+        follow(self.flow, reads, &mean)?;
+        Ok(mean)
+    }
+
+    /// The ids of alpha, each behind a blank; and the variance that it takes up, with the mean normal behind it.
+    fn widening(
+        &self,
+        known: &TextureFacts,
+        reads: &[Value],
+    ) -> Result<(String, Vec<f32>), Declined> {
+        let mean = self.mean(Choice::NormalToRoughness, Some(known), reads)?;
+        let alphas = roughness::find(self.flow, reads)?;
+        let ids: Vec<&ValueId> = alphas.iter().map(|alpha| self.flow.id(*alpha)).collect();
+        let seen = ids.iter().filter_map(|id| self.facts.values.get(id));
+        if seen
+            .flat_map(|seen| &seen.max)
+            .any(|max| !(*max <= roughness::MOST))
+        {
+            return Err(Declined(format!(
+                "`{}` is seen above {}, so that it is no roughness",
+                ids[0].path(),
+                roughness::MOST
+            )));
+        }
+        let variance = known
+            .slope_variance()
+            .filter(|variance| *variance > 0.0)
+            .ok_or_else(|| Declined("its normals do not vary".into()))?;
+        let numbers = std::iter::once(variance).chain(mean).collect();
+        Ok((ids.iter().map(|id| format!(" {id}")).collect(), numbers))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facts::TextureFacts;
     use crate::flow::tests::shader;
 
     #[test]
@@ -357,6 +467,7 @@ mod tests {
             mean: vec![[0.5; 4]; 2],
             deviation: vec![[0.25; 4], [0.125; 4]],
             level: 1.0,
+            ..TextureFacts::default()
         };
         facts.textures.insert("grain".into(), texture);
         let offered = TextureRemoval.candidates(&shader, &facts);
