@@ -1,10 +1,11 @@
 //! What makes a variant a level: all samples confirm it over its whole interval, and pictures that the search has not
 //! seen do not contradict.
 
-use super::error::exceeds;
-use super::frontier::Seen;
+use super::descend::Confirmed;
+use super::error::{Details, exceeds};
+use super::guard::Guard;
 use super::levels::{Level, threshold};
-use super::samples::{Measured, SampleSet, Samples, Stand};
+use super::samples::{Measured, SampleSet, Samples, Stand, compile};
 use crate::eval::program::Refused;
 use crate::scene::Split;
 use lodc_passes::{Recipe, Shader};
@@ -19,8 +20,19 @@ pub(super) struct Checks<'a> {
 }
 
 /// What the checks say of a variant.
-enum Verdict {
-    /// It may be a level; what was measured at the start.
+pub(super) struct Verdict {
+    pub(super) finding: Finding,
+    /// What all samples say of its mean error and of its worst view: how much of its bound it uses up, the most in its
+    /// interval.
+    pub(super) strain_of_means: f64,
+    /// What was measured at each place of the interval.
+    details: Vec<Details>,
+}
+
+/// Whether a variant may be a level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Finding {
+    /// It may; what was measured at the start.
     Confirmed(Measured),
     /// It is over its bound.
     Over,
@@ -54,6 +66,11 @@ impl<'a> Checks<'a> {
         })
     }
 
+    /// What recipes are replayed on.
+    pub(super) fn base(&self) -> &'a Shader {
+        self.stand.base
+    }
+
     /// All samples where the interval starts.
     pub(super) fn start(&self) -> &SampleSet<'a> {
         &self.full[0]
@@ -61,60 +78,71 @@ impl<'a> Checks<'a> {
 
     /// Whether a shader passes every check.
     pub(super) fn hold(&self, shader: &Shader) -> bool {
-        matches!(self.judge(shader), Ok(Verdict::Confirmed(_)))
+        let verdict = self.judge(shader);
+        verdict.is_ok_and(|verdict| matches!(verdict.finding, Finding::Confirmed(_)))
     }
 
-    fn judge(&self, shader: &Shader) -> Result<Verdict, Refused> {
+    /// Draws a shader in full, over its whole interval.
+    pub(super) fn judge(&self, shader: &Shader) -> Result<Verdict, Refused> {
+        let program = compile(shader, &[])?;
         let mut start = None;
+        let mut verdict = Verdict {
+            finding: Finding::Over,
+            strain_of_means: 0.0,
+            details: Vec::new(),
+        };
+        let mut strain = 0.0_f64;
         for set in &self.full {
-            let measured = set.measure(shader)?;
-            if measured.strain > 1.0 {
-                return Ok(Verdict::Over);
-            }
+            let (details, measured) = set.in_full(&program);
+            let figures = set.figures_of(&details);
+            strain = strain.max(measured.strain);
+            verdict.strain_of_means = verdict.strain_of_means.max(figures.strain_of_means());
+            verdict.details.push(details);
             start.get_or_insert(measured);
         }
-        for set in &self.validation {
-            let (details, original) = set.pair(shader)?;
-            let scene = self.stand.scene;
-            let bound = (scene.bound(set.distance()), scene.reading);
-            if exceeds(&details, original, bound) {
-                return Ok(Verdict::Withdrawn);
+        if strain <= 1.0 {
+            verdict.finding = start.map_or(Finding::Over, Finding::Confirmed);
+            for set in &self.validation {
+                let (details, original) = set.pair(shader)?;
+                let scene = self.stand.scene;
+                let bound = (scene.bound(set.distance()), scene.reading);
+                if exceeds(&details, original, bound) {
+                    verdict.finding = Finding::Withdrawn;
+                }
             }
         }
-        Ok(start.map_or(Verdict::Over, Verdict::Confirmed))
+        Ok(verdict)
     }
 
-    /// The cheapest member that passes every check, as a level, and how many were withdrawn on the way. Error falls as
-    /// cost rises along a frontier, so the place is found by bisection.
-    pub(super) fn cheapest(&self, members: &[&Seen]) -> (Option<Level>, usize) {
-        let (mut low, mut high) = (0, members.len());
-        let mut best = None;
-        let mut withdrawn = 0;
-        while low < high {
-            let middle = low + (high - low) / 2;
-            let shader = members[middle].recipe.replay(self.stand.base).ok();
-            let shader = shader.filter(|shader| shader.validate().is_ok());
-            match shader.map(|shader| self.judge(&shader)) {
-                Some(Ok(Verdict::Confirmed(measured))) => {
-                    best = Some((members[middle], measured));
-                    high = middle;
-                }
-                Some(Ok(Verdict::Withdrawn)) => {
-                    withdrawn += 1;
-                    low = middle + 1;
-                }
-                _ => low = middle + 1,
+    /// Has a guard keep what spoke against a variant.
+    pub(super) fn teach(
+        &self,
+        guard: &mut Guard<'a>,
+        measured: &Measured,
+        verdict: &Verdict,
+    ) -> Result<(), Refused> {
+        let mut tiles = false;
+        for (set, details) in self.full.iter().zip(&verdict.details) {
+            if set.figures_of(details).strain_of_tiles() > 1.0 {
+                guard.keep(set, details)?;
+                tiles = true;
             }
         }
-        let level = best.and_then(|(member, measured)| self.level(member, &measured));
-        (level, withdrawn)
+        if !tiles || verdict.strain_of_means > 1.0 {
+            guard.lower(measured, verdict.strain_of_means);
+        }
+        Ok(())
     }
 
-    /// A confirmed member as a level.
-    fn level(&self, member: &Seen, measured: &Measured) -> Option<Level> {
+    /// A confirmed variant as a level; what each step leaves is measured on the search's own samples.
+    pub(super) fn level(
+        &self,
+        Confirmed { recipe, measured }: &Confirmed,
+        search: &SampleSet<'_>,
+    ) -> Option<Level> {
         let start = self.start();
         let distance = start.distance();
-        let recipe = minimal(self.stand.base, &member.recipe);
+        let recipe = minimal(self.stand.base, recipe);
         let shader = recipe.replay(self.stand.base).ok()?;
         Some(Level {
             autolod: threshold(self.stand.scene, distance),
@@ -125,7 +153,7 @@ impl<'a> Checks<'a> {
             shader,
             work: measured.work,
             cost: measured.work.total() / start.original().work.total(),
-            error_after: error_after(self.stand, &recipe, start),
+            error_after: error_after(self.stand, &recipe, search),
             recipe,
         })
     }
@@ -146,7 +174,7 @@ fn minimal(base: &Shader, recipe: &Recipe) -> Recipe {
     kept
 }
 
-/// The RMSE after each step of a recipe.
+/// The RMSE after each step of a recipe, over some samples.
 fn error_after(stand: &Stand<'_>, recipe: &Recipe, set: &SampleSet<'_>) -> Vec<f64> {
     let mut shader = stand.base.clone();
     let mut errors = Vec::new();

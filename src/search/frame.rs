@@ -19,11 +19,13 @@ pub(super) const GRID: u32 = 4;
 
 /// How much of a frame is looked at.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Part {
+pub(super) enum Part<'a> {
     /// At most so many squares of 2 x 2 pixels.
     Squares(usize),
     /// At most so many tiles.
     Tiles(usize),
+    /// These tiles, by column and row.
+    These(&'a BTreeSet<(u32, u32)>),
 }
 
 /// What draws a frame: the stages of a shader, and the scene as it is for that shader.
@@ -64,7 +66,7 @@ impl Rasterised {
         pens: &[(Pen<'_>, Frame)],
         view: usize,
         offsets: &[[f32; 2]],
-        (part, seed): (Part, u64),
+        (part, seed): (Part<'_>, u64),
     ) -> Vec<Self> {
         let at = |frame: &Frame, offset: [f32; 2], grid: u32| Frame {
             offset,
@@ -91,13 +93,21 @@ impl Rasterised {
         let (side, most) = match part {
             Part::Squares(most) => (1, most),
             Part::Tiles(most) => (TILE / 2, most),
+            Part::These(_) => (TILE / 2, 0),
         };
         let place = |(x, y): (u32, u32)| (x / side, y / side);
         let mut places: Vec<_> = all.flat_map(Coverage::squares).map(place).collect();
         places.sort_unstable();
         places.dedup();
         if places.len() > most {
-            let kept = choose(&places, most.max(1), seed);
+            let chosen;
+            let kept = match part {
+                Part::These(tiles) => tiles,
+                Part::Squares(_) | Part::Tiles(_) => {
+                    chosen = choose(&places, most.max(1), seed);
+                    &chosen
+                }
+            };
             let part = |coverage: &Coverage| coverage.part(|square| kept.contains(&place(square)));
             for coverage in coverages.iter_mut().flatten() {
                 *coverage = part(coverage);
@@ -139,6 +149,11 @@ impl Rasterised {
     /// Which of the scene's views it is.
     pub(super) fn view(&self) -> usize {
         self.view
+    }
+
+    /// Column and row of each of its tiles.
+    pub(super) fn tiles(&self) -> &[(u32, u32)] {
+        self.reference.tile_places()
     }
 
     /// Draws a program at every offset and compares with the reference.

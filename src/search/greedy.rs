@@ -11,6 +11,7 @@
 
 use super::best::best;
 use super::frontier::{Frontier, Seen};
+use super::guard::Guard;
 use super::interval::Interval;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
@@ -88,15 +89,61 @@ fn key(candidate: &Candidate) -> Key {
     )
 }
 
+/// The keys of a step that a recipe has: with the best numbers it goes by another choice than it was offered as.
+fn keys(step: &Candidate) -> impl Iterator<Item = Key> {
+    let (pass, site, choice) = key(step);
+    let words = match choice.as_str() {
+        "best" => vec!["mean", "seen-mean", "texture-mean"],
+        choice => vec![choice],
+    };
+    let words: Vec<String> = words.into_iter().map(str::to_owned).collect();
+    words
+        .into_iter()
+        .map(move |word| (pass.clone(), site.clone(), word))
+}
+
 /// Prices that earlier steps, or the search at another distance, found. Only their order is used;
 /// `None` stands for a candidate that saved no work.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Prices(BTreeMap<Key, Option<Price>>);
 
+/// A variant on the way down.
+#[derive(Clone, Debug)]
+pub(crate) struct Stop {
+    pub(crate) variant: Variant,
+    /// What was over its bound on the way here. Errors seldom shrink: it is not tried again further down.
+    over: BTreeSet<Key>,
+}
+
+impl Stop {
+    /// A variant from which some candidates are not tried.
+    pub(crate) fn without<'a>(
+        variant: Variant,
+        banned: impl Iterator<Item = &'a Candidate>,
+    ) -> Self {
+        let over = banned.flat_map(keys).collect();
+        Self { variant, over }
+    }
+
+    /// Everything may be tried again from here.
+    pub(crate) fn forget(&mut self) {
+        self.over.clear();
+    }
+}
+
+impl From<Variant> for Stop {
+    fn from(variant: Variant) -> Self {
+        let over = BTreeSet::new();
+        Self { variant, over }
+    }
+}
+
 /// What one greedy descent is told.
-pub(crate) struct Descent<'a> {
+pub(crate) struct Descent<'a, 'b> {
     /// The samples that it is judged on, within their bounds.
-    pub(crate) interval: &'a Interval<'a>,
+    pub(crate) interval: &'a Interval<'b>,
+    /// What every step has to pass.
+    pub(crate) guard: &'a Guard<'b>,
     /// Told how many variants have been measured, and the cost of the current one as a share of the
     /// original's.
     pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
@@ -113,16 +160,24 @@ struct Step<'a> {
     tried: BTreeMap<Fingerprint, Measured>,
 }
 
-impl Descent<'_> {
-    /// Simplifies `start` until nothing is left that saves work within the limit. Every variant that
-    /// was measured goes to the frontier. Returns how many that were.
-    pub(crate) fn run(&self, start: Variant, prices: &mut Prices, frontier: &mut Frontier) -> u64 {
-        let mut current = start;
+impl Descent<'_, '_> {
+    /// Simplifies the last variant of a way down until nothing is left that saves work within the limit, and adds each
+    /// step to the way. Every variant that was measured goes to the frontier. Returns how many that were.
+    pub(crate) fn run(
+        &self,
+        way: &mut Vec<Stop>,
+        prices: &mut Prices,
+        frontier: &mut Frontier,
+    ) -> u64 {
+        let Some(Stop {
+            variant: mut current,
+            mut over,
+        }) = way.last().cloned()
+        else {
+            return 0;
+        };
         let mut measured = 0;
-        // Errors seldom shrink as work goes: what was over the limit once is not tried again here.
-        let mut over = BTreeSet::new();
         let mut swept = false;
-        frontier.add(current.seen());
         loop {
             let facts = self.interval.start().facts(&current.shader);
             let candidates: Vec<Candidate> = PASSES
@@ -136,20 +191,36 @@ impl Descent<'_> {
                 candidates,
                 current: &current,
             };
-            let leader = self.lead(&mut step, prices, &mut over, frontier, &mut measured, swept);
-            let next = leader.and_then(|i| step.take(i));
+            let mut next = None;
+            while let Some(leader) =
+                self.lead(&mut step, prices, &mut over, frontier, &mut measured, swept)
+            {
+                next = step.take(leader).filter(|next| self.allows(next));
+                if next.is_some() {
+                    break;
+                }
+                over.insert(step.keys[leader].clone());
+            }
             let next =
                 next.map(|next| self.with_best_numbers(next, &current, frontier, &mut measured));
             match next {
                 Some(next) => {
                     current = next;
                     swept = false;
+                    way.push(Stop {
+                        variant: current.clone(),
+                        over: over.clone(),
+                    });
                 }
                 // What saved nothing may save something now that its other users are gone.
                 None if !swept => swept = true,
                 None => return measured,
             }
         }
+    }
+
+    fn allows(&self, variant: &Variant) -> bool {
+        self.guard.allows(&variant.shader, &variant.measured)
     }
 
     /// The variant with the best numbers in its last step, found only now that it is worth a step.
@@ -166,7 +237,7 @@ impl Descent<'_> {
             .last()
             .and_then(|last| best(self.interval, &current.shader, last, &next.measured));
         if let Some(better) = better
-            && better.measured.strain <= 1.0
+            && self.guard.allows(&better.shader, &better.measured)
         {
             *measured += 1;
             next.recipe.0.pop();
@@ -193,7 +264,7 @@ impl Descent<'_> {
             .clone()
             .filter(|i| match prices.0.get(&step.keys[*i]) {
                 None => true,
-                Some(None) => sweep,
+                Some(None) => sweep && step.fresh[*i].is_none(),
                 Some(Some(_)) => false,
             })
             .collect();
@@ -233,7 +304,7 @@ impl Step<'_> {
     /// Measures candidates in parallel and notes their prices.
     fn measure(
         &mut self,
-        descent: &Descent<'_>,
+        descent: &Descent<'_, '_>,
         batch: &[usize],
         prices: &mut Prices,
         over: &mut BTreeSet<Key>,
@@ -276,7 +347,7 @@ impl Step<'_> {
                     strain: measured.strain,
                     work: measured.work,
                 });
-                if measured.strain > 1.0 {
+                if !descent.guard.admits(&measured) {
                     over.insert(self.keys[i].clone());
                 }
             }

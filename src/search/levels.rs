@@ -6,9 +6,11 @@
 //! interval in which the level is used, and pictures that the search has not seen do not contradict.
 
 use super::confirm::Checks;
+use super::descend::Bottom;
 use super::error::{ErrorFigures, HeldOut};
 use super::frontier::{Frontier, Seen};
-use super::greedy::{Descent, Prices, Variant};
+use super::greedy::{Prices, Variant};
+use super::guard::Guard;
 use super::interval::Interval;
 use super::samples::{SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
@@ -39,7 +41,7 @@ pub struct Level {
     pub work: Work,
     /// The work as a share of the original's at the same distance: an estimate of the run time.
     pub cost: f64,
-    /// For each step of the recipe, the RMSE after it, over the full set.
+    /// For each step of the recipe, the RMSE after it, over the samples that the search looked at.
     pub error_after: Vec<f64>,
 }
 
@@ -121,40 +123,46 @@ pub fn find(
     drop(nearest);
     let mut seen = Vec::new();
     let mut prices = Prices::default();
+    let mut guard = Guard::new(stand);
     let mut variants = 0;
     let mut before_checks = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
         let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
         let middle = (distance * next).sqrt();
         let search = Interval::new(stand, &[distance, next], Samples::Search)?;
-        let descent = Descent {
+        let checks = Checks::new(stand, [distance, middle, next], before_checks.take())?;
+        guard.start_at(distance);
+        let mut bottom = Bottom {
             interval: &search,
-            progress: &|measured, share| {
+            checks: &checks,
+            guard: &mut guard,
+            prices: &mut prices,
+            frontier: Frontier::default(),
+            found: None,
+            variants,
+            withdrawn: 0,
+            progress: &|variants, share| {
                 progress(Progress {
                     distance: at,
                     of: distances.len() - 1,
-                    variants: variants + measured,
+                    variants,
                     share,
                 });
             },
         };
         let base = Variant::new(&search, Recipe::default(), stand.base.clone())?;
         let before = &levels[levels.len() - 1];
-        let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())
-            .ok()
-            .filter(|variant| variant.measured.strain <= 1.0)
-            .unwrap_or_else(|| base.clone());
-        let mut frontier = Frontier::default();
-        frontier.add(base.seen());
-        variants += descent.run(start, &mut prices, &mut frontier);
-        let feasible: Vec<&Seen> = frontier
-            .members()
-            .iter()
-            .filter(|member| member.strain <= 1.0)
-            .collect();
-        let checks = Checks::new(stand, [distance, middle, next], before_checks.take())?;
-        let before = &levels[levels.len() - 1];
-        let (found, withdrawn) = checks.cheapest(&feasible);
+        let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())?;
+        bottom.find(&base, start)?;
+        let Bottom {
+            frontier,
+            found,
+            withdrawn,
+            variants: measured,
+            ..
+        } = bottom;
+        variants = measured;
+        let found = found.and_then(|found| checks.level(&found, search.start()));
         let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * before.cost;
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {

@@ -5,12 +5,14 @@
 //! SampleSet x Shader --error--> E^2, work      one variant
 //! base x SampleSet --greedy, best--> variants --frontier--> non-dominated ones
 //! frontiers x distances --levels--> levels     confirmed on the full set
+//!   what it refuses --guard--> what greedy has to heed
 //! ```
 //!
 //! It knows nothing of the command line or of reports.
 
 mod best;
 mod confirm;
+mod descend;
 #[cfg(feature = "gpu")]
 pub mod drawn;
 pub mod error;
@@ -18,6 +20,7 @@ mod facts;
 mod frame;
 pub mod frontier;
 mod greedy;
+mod guard;
 mod interval;
 pub mod levels;
 pub mod samples;

@@ -11,6 +11,7 @@ use crate::scene::{
 use lodc_passes::{Shader, Stage, Work};
 use naga::{Expression, Handle};
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Squares of 2 x 2 pixels that a search set has, over all of its frames; a frame has at least one block full.
 const SEARCH_SQUARES: usize = 1024;
@@ -24,6 +25,9 @@ const HELD_OUT: usize = 16;
 
 /// The least bound that errors are weighed by, so that a bound of 0 weighs them too.
 const LEAST_BOUND: f64 = 1e-6;
+
+/// A tile that uses up less than this part of its squared error is not close to its bound.
+const CLOSE: f64 = 0.5;
 
 /// What a search stands on.
 pub struct Stand<'a> {
@@ -53,7 +57,8 @@ pub enum Samples {
 pub struct Measured {
     /// Its error against the reference.
     pub error: ErrorSum,
-    /// How much of its bound it uses up at this distance; feasible when at most 1 (see [`ErrorFigures::strain`]).
+    /// How much of its bound it uses up at this distance; feasible when at most 1 (see [`ErrorFigures::strain`]). Of a
+    /// search set, which has no whole tiles and each pixel at one offset only, that of the excess and of the worst view.
     pub strain: f64,
     /// `E^2` less the original's, in units of the square of the bound: what a search weighs against work.
     pub load: f64,
@@ -72,10 +77,15 @@ pub struct OverBlack {
     pub pixels: Vec<[f32; 3]>,
 }
 
+/// Tiles of frames: by the number of the frame, their columns and rows.
+pub(super) type Tiles = BTreeMap<usize, BTreeSet<(u32, u32)>>;
+
 /// The samples at one distance.
 pub struct SampleSet<'a> {
     pub(super) stand: &'a Stand<'a>,
     distance: f64,
+    /// Whether it has all that the strain asks for: whole tiles, at every offset.
+    whole: bool,
     pub(super) frames: Vec<Rasterised>,
     original: (Details, Work),
 }
@@ -151,6 +161,7 @@ impl<'a> SampleSet<'a> {
         let mut sets = stands.map(|stand| Self {
             stand,
             distance,
+            whole: samples != Samples::Search,
             frames: Vec::with_capacity(count),
             original: Default::default(),
         });
@@ -164,6 +175,48 @@ impl<'a> SampleSet<'a> {
             set.original = original.clone();
         }
         Ok(sets)
+    }
+
+    /// Some tiles alone, each as all samples have it.
+    ///
+    /// # Errors
+    /// When the evaluator refuses the original.
+    pub(super) fn of_tiles(
+        stand: &'a Stand<'a>,
+        distance: f64,
+        tiles: &Tiles,
+    ) -> Result<Self, Refused> {
+        let original = compile(stand.base, &[])?;
+        let scene = stand.scene;
+        let frames = scene.frames(distance).into_par_iter().enumerate();
+        let frames: Vec<Vec<Rasterised>> = frames
+            .filter_map(|(index, frame)| {
+                let part = Part::These(tiles.get(&index)?);
+                let seed = child(scene.seed, index as u64);
+                let view = index / scene.uniform_samples();
+                let offsets = offsets(scene.offsets, seed);
+                let pen = Pen {
+                    vertex: stand.vertex,
+                    fragment: &original,
+                    scene,
+                };
+                Some(Rasterised::new(
+                    &[(pen, frame)],
+                    view,
+                    &offsets,
+                    (part, seed),
+                ))
+            })
+            .collect();
+        let mut set = Self {
+            stand,
+            distance,
+            whole: true,
+            frames: frames.into_iter().flatten().collect(),
+            original: Default::default(),
+        };
+        set.original = set.details(&original);
+        Ok(set)
     }
 
     /// The distance of its frames, in world units.
@@ -192,6 +245,13 @@ impl<'a> SampleSet<'a> {
     /// Measures any fragment program with the original's interface.
     pub fn measure_program(&self, fragment: &Program) -> Measured {
         self.judge(&self.details(fragment))
+    }
+
+    /// Measures a program, with all that was measured of it.
+    pub(super) fn in_full(&self, fragment: &Program) -> (Details, Measured) {
+        let details = self.details(fragment);
+        let measured = self.judge(&details);
+        (details.0, measured)
     }
 
     /// All error figures of a variant, against the original's and the bound at this distance.
@@ -251,7 +311,33 @@ impl<'a> SampleSet<'a> {
         Ok((details, &self.original.0))
     }
 
-    fn figures_of(&self, details: &Details) -> ErrorFigures {
+    /// The tiles that use up the most of their bound, at most so many; none that use up less than [`CLOSE`].
+    pub(super) fn worst_tiles(&self, details: &Details, most: usize) -> Tiles {
+        let frames = self.frames.iter().enumerate();
+        let places = frames.flat_map(|(i, frame)| frame.tiles().iter().map(move |tile| (i, *tile)));
+        let added = details.tiles.iter().zip(&self.original.0.tiles);
+        let mut worst: Vec<(f64, (usize, (u32, u32)))> = added
+            .map(|(level, original)| level - original)
+            .zip(places)
+            .collect();
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        worst.truncate(most);
+        let least = CLOSE * self.figures_of(details).tile_limit();
+        let mut tiles = Tiles::new();
+        for (added, (frame, tile)) in worst {
+            if added > least {
+                tiles.entry(frame).or_default().insert(tile);
+            }
+        }
+        tiles
+    }
+
+    /// How much of its bound the worst of its tiles uses up.
+    pub(super) fn strain_of_tiles(&self, fragment: &Program) -> f64 {
+        self.figures_of(&self.details(fragment).0).strain_of_tiles()
+    }
+
+    pub(super) fn figures_of(&self, details: &Details) -> ErrorFigures {
         let scene = self.stand.scene;
         let bound = (scene.bound(self.distance), scene.reading);
         ErrorFigures::new(details, &self.original.0, bound)
@@ -262,7 +348,10 @@ impl<'a> SampleSet<'a> {
         let added = details.error.square() - self.original.0.error.square();
         Measured {
             error: details.error,
-            strain: figures.strain(),
+            strain: match self.whole {
+                true => figures.strain(),
+                false => figures.strain_of_means(),
+            },
             load: added / figures.bound.max(LEAST_BOUND).powi(2),
             work: *work,
         }

@@ -10,8 +10,51 @@ use naga::{BinaryOperator, Expression, Handle, Literal, MathFunction, TypeInner,
 
 /// The part of a value's variance that a line may leave: above it the mean does nearly as well, for less.
 const MOST_LEFT: f64 = 0.5;
-/// How much better than keeping the operand a line must be, as a part of the squared error.
-const KEEPS_AS_WELL: f64 = 0.9;
+/// How much better than something simpler a line must be, as a part of the squared error.
+const AS_WELL: f64 = 0.9;
+
+/// What is simpler than a line, and is offered elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Simpler {
+    /// The operand itself.
+    Kept,
+    /// A sum or difference whose other side becomes a number: the operand, times this, and a number.
+    Shifted(f64),
+    /// A product whose other side becomes a number.
+    Scaled,
+}
+
+impl Simpler {
+    /// What the other operand of a sum, a difference or a product leaves when it becomes a number.
+    pub(super) fn of(expression: &Expression, operand: Value) -> Option<(Self, Value)> {
+        let Expression::Binary { op, left, right } = *expression else {
+            return None;
+        };
+        let other = if left == operand { right } else { left };
+        let simpler = match op {
+            BinaryOperator::Add => Self::Shifted(1.0),
+            BinaryOperator::Subtract if left == operand => Self::Shifted(1.0),
+            BinaryOperator::Subtract => Self::Shifted(-1.0),
+            BinaryOperator::Multiply => Self::Scaled,
+            _ => return None,
+        };
+        (other != operand).then_some((simpler, other))
+    }
+
+    /// The mean squared error that it leaves of a component.
+    fn error(self, seen: &Moments) -> f64 {
+        let [value, operand] = seen.mean;
+        seen.error_of(match self {
+            Self::Kept => [1.0, 0.0],
+            Self::Shifted(scale) => [scale, value - scale * operand],
+            Self::Scaled => {
+                let square = seen.squares[1] / seen.weight + operand * operand;
+                let product = seen.product / seen.weight + value * operand;
+                [if square > 0.0 { product / square } else { 0.0 }, 0.0]
+            }
+        })
+    }
+}
 
 /// The operands of an operation on floats that it can be fitted to: those that vary, with as many components, or one.
 pub(super) fn operands(flow: &Flow, site: Value) -> Vec<Value> {
@@ -123,16 +166,15 @@ pub(super) fn work(count: usize, limited: bool) -> f64 {
 }
 
 /// The numbers of the line, scales and then offsets, from what was seen of each component; declined where something
-/// simpler does as well. `can_keep` says that the operand itself could take the value's place.
-pub(super) fn numbers(seen: &[Moments], can_keep: bool) -> Result<Vec<f32>, Declined> {
+/// simpler does as well.
+pub(super) fn numbers(seen: &[Moments], simpler: &[Simpler]) -> Result<Vec<f32>, Declined> {
     let mut lines = Vec::with_capacity(seen.len());
-    let (mut left, mut variance, mut kept) = (0.0, 0.0, 0.0);
+    let (mut left, mut variance) = (0.0, 0.0);
     for moments in seen {
         // A component of which nothing follows the operand has its mean.
         let line = moments.line().unwrap_or([0.0, moments.mean[0]]);
         left += moments.error_of(line);
         variance += moments.error_of([0.0, moments.mean[0]]);
-        kept += moments.error_of([1.0, 0.0]);
         lines.push(line);
     }
     // A comparison with NaN fails, and so declines.
@@ -140,8 +182,15 @@ pub(super) fn numbers(seen: &[Moments], can_keep: bool) -> Result<Vec<f32>, Decl
     if !good {
         return Err(Declined("its mean does nearly as well".into()));
     }
-    if can_keep && left > KEEPS_AS_WELL * kept {
-        return Err(Declined("keeping the operand does as well".into()));
+    for other in simpler {
+        let leaves: f64 = seen.iter().map(|moments| other.error(moments)).sum();
+        if left > AS_WELL * leaves {
+            let what = match other {
+                Simpler::Kept => "keeping the operand",
+                Simpler::Shifted(_) | Simpler::Scaled => "a number for the other operand",
+            };
+            return Err(Declined(format!("{what} does as well")));
+        }
     }
     let numbers: Vec<f32> = [0, 1]
         .into_iter()
@@ -150,5 +199,53 @@ pub(super) fn numbers(seen: &[Moments], can_keep: bool) -> Result<Vec<f32>, Decl
     match numbers.iter().all(|number| number.is_finite()) {
         true => Ok(numbers),
         false => Err(Declined("the line has no finite numbers".into())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is seen of a value that follows an operand, and is a little off to either side in turn.
+    fn seen(value: impl Fn(f64) -> f64) -> [Moments; 1] {
+        let mut seen = Moments::default();
+        for i in 0..64 {
+            let operand = 1.0 + f64::from(i / 2) / 16.0;
+            let off = if i % 2 == 0 { 0.1 } else { -0.1 };
+            seen.add([value(operand) + off, operand], 1.0);
+        }
+        [seen]
+    }
+
+    #[test]
+    fn a_line_is_no_better_than_a_number_for_what_does_not_follow_the_operand() {
+        let declined = |seen: [Moments; 1], simpler| numbers(&seen, &[simpler]).is_err();
+        assert!(declined(seen(|x| x + 0.5), Simpler::Shifted(1.0)));
+        assert!(declined(seen(|x| 0.5 - x), Simpler::Shifted(-1.0)));
+        assert!(declined(seen(|x| 3.0 * x), Simpler::Scaled));
+        assert!(declined(seen(|x| x), Simpler::Kept));
+        // Nothing simpler does these.
+        assert!(!declined(seen(|x| 0.6 * x), Simpler::Shifted(1.0)));
+        assert!(!declined(seen(|x| 3.0 * x - 2.0), Simpler::Scaled));
+        assert!(!declined(seen(|x| x + 0.5), Simpler::Kept));
+        // Noise alone has a mean.
+        assert!(numbers(&seen(|_| 1.0), &[]).is_err());
+    }
+
+    #[test]
+    fn sums_and_products_have_another_operand() {
+        let mut arena = naga::Arena::new();
+        let span = naga::Span::default();
+        let [a, b] = [0, 1].map(|i| arena.append(Expression::FunctionArgument(i), span));
+        let of = |op, left, right, operand| {
+            Simpler::of(&Expression::Binary { op, left, right }, operand)
+        };
+        use BinaryOperator as Op;
+        assert_eq!(of(Op::Add, a, b, b), Some((Simpler::Shifted(1.0), a)));
+        assert_eq!(of(Op::Subtract, a, b, a), Some((Simpler::Shifted(1.0), b)));
+        assert_eq!(of(Op::Subtract, a, b, b), Some((Simpler::Shifted(-1.0), a)));
+        assert_eq!(of(Op::Multiply, a, b, a), Some((Simpler::Scaled, b)));
+        assert_eq!(of(Op::Multiply, a, a, a), None);
+        assert_eq!(of(Op::Divide, a, b, a), None);
     }
 }

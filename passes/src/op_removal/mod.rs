@@ -36,7 +36,7 @@
 //! - What depends on a uniform or texture that may take any value, unless what takes its place does too; and
 //!   `mean`, `best` and `fit` of it always. Like guards, this is decided when candidates are listed.
 //! - `fit` where it costs as much as what it removes; where the line leaves more than half of the value's
-//!   variance; and where keeping the operand does as well.
+//!   variance; and where the operand, or with it a number for the other operand of a sum or product, does as well.
 //! - `mean` where it is dominated: the only user is an operation on the value and constants, whose own
 //!   mean is cheaper and no worse.
 //! - `without` where an operation has no such operand, or there is only one operation.

@@ -1,5 +1,6 @@
 //! Which of the possible removals are offered, by what the facts say of them.
 
+use super::fit::Simpler;
 use super::{
     If, OpRemoval, all_of, fit, follow, has_mean, ifs, may_change, mean_components, own_operands,
     take, without,
@@ -181,9 +182,12 @@ impl<'a> Survey<'a> {
         let seen = self.facts.pairs.get(&pair);
         let seen = seen.filter(|seen| seen.iter().all(|moments| moments.weight > 0.0));
         let seen = seen.ok_or_else(|| Declined("no sample of the scene computes it".into()))?;
-        let can_keep =
-            self.flow.inner(operand) == self.flow.inner(site) && self.keep(site, operand).is_ok();
-        let mut numbers = fit::numbers(seen, can_keep)?;
+        let mut simpler = Vec::new();
+        if self.flow.inner(operand) == self.flow.inner(site) && self.keep(site, operand).is_ok() {
+            simpler.push(Simpler::Kept);
+        }
+        simpler.extend(self.number_beside(site, operand));
+        let mut numbers = fit::numbers(seen, &simpler)?;
         if self.holes[site.index()] != Holes::default() {
             let range = self.facts.values.get(self.flow.id(site));
             let range = range.filter(|range| {
@@ -198,6 +202,16 @@ impl<'a> Survey<'a> {
             numbers.extend(range.min.iter().chain(&range.max));
         }
         Ok(numbers.iter().map(|number| number.to_bits()).collect())
+    }
+
+    /// What is left of a sum or product when its other operand becomes a number; nothing when that one is used elsewhere
+    /// too, or has fewer components than the line has numbers, or no mean.
+    fn number_beside(&self, site: Value, operand: Value) -> Option<Simpler> {
+        let (simpler, other) = Simpler::of(&self.flow.function.expressions[site], operand)?;
+        let count = mean_components(self.flow, other)?;
+        let alone = self.flow.users(other).all(|user| user == site);
+        let free = alone && self.flow.floats(site) == Some(count);
+        (free && self.mean(other, count).is_ok()).then_some(simpler)
     }
 
     /// Declines a number for what may take any value.

@@ -117,24 +117,47 @@ impl ErrorFigures {
     /// `e_a / 2`. It is feasible when this is at most 1. In the paper's reading it is the error alone, with all of the
     /// original's own in it.
     pub fn strain(&self) -> f64 {
-        let share = |what: f64, factor: f64| {
-            let limit = factor * self.bound;
-            if what <= 0.0 {
-                0.0
-            } else if limit > 0.0 {
-                what / limit
-            } else {
-                f64::INFINITY
-            }
-        };
+        if self.reading == BoundReading::Paper {
+            return self.strain_of_means();
+        }
+        self.strain_of_means()
+            .max(self.strain_of_tiles())
+            .max(self.share(self.shimmer - self.shimmer_floor, SHIMMER_FACTOR))
+    }
+
+    /// The part of the strain that a few pixels of each frame tell: that of the excess and of the worst view.
+    pub(crate) fn strain_of_means(&self) -> f64 {
         if self.reading == BoundReading::Paper {
             // The paper's norm sums three channels where E^2 is their mean; both sides are divided by the size on screen.
-            return share(3.0 * self.rmse * self.rmse, 1.0);
+            return self.share(3.0 * self.rmse * self.rmse, 1.0);
         }
-        share(self.excess(), 1.0)
-            .max(share(self.worst_view, VIEW_FACTOR))
-            .max(share(self.worst_tile, TILE_FACTOR))
-            .max(share(self.shimmer - self.shimmer_floor, SHIMMER_FACTOR))
+        self.share(self.excess(), 1.0)
+            .max(self.share(self.worst_view, VIEW_FACTOR))
+    }
+
+    /// That of the worst tile, which only whole tiles tell.
+    pub(crate) fn strain_of_tiles(&self) -> f64 {
+        match self.reading {
+            BoundReading::Excess => self.share(self.worst_tile, TILE_FACTOR),
+            BoundReading::Paper => 0.0,
+        }
+    }
+
+    /// `E^2` that a tile may have more than the original.
+    pub(crate) fn tile_limit(&self) -> f64 {
+        (TILE_FACTOR * self.bound).powi(2)
+    }
+
+    /// What part of its limit, some bounds, something uses up.
+    fn share(&self, what: f64, bounds: f64) -> f64 {
+        let limit = bounds * self.bound;
+        if what <= 0.0 {
+            0.0
+        } else if limit > 0.0 {
+            what / limit
+        } else {
+            f64::INFINITY
+        }
     }
 }
 

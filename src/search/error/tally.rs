@@ -50,6 +50,8 @@ pub(crate) struct Reference {
     coverage: f64,
     /// For each pixel, its tile, counted from 0 in the order of the tiles.
     tiles: Vec<u32>,
+    /// Column and row of each tile.
+    tile_places: Vec<(u32, u32)>,
     /// Each tile's coverage by the reference, in pixels.
     tile_coverage: Vec<f64>,
 }
@@ -70,6 +72,7 @@ impl Reference {
         }
         let numbers: BTreeMap<_, u32> = found.keys().copied().zip(0..).collect();
         reference.tiles = places.iter().map(|tile| numbers[tile]).collect();
+        reference.tile_places = found.keys().map(|(row, column)| (*column, *row)).collect();
         reference.tile_coverage = found.into_values().collect();
         reference
     }
@@ -110,6 +113,11 @@ impl Reference {
         pixels
             .map(|(pixel, colour)| pixel.difference(colour))
             .collect()
+    }
+
+    /// Column and row of each tile, in the order of [`FrameError::tiles`].
+    pub(crate) fn tile_places(&self) -> &[(u32, u32)] {
+        &self.tile_places
     }
 
     /// How many pixels it has.
