@@ -1,7 +1,7 @@
 //! Draws the picture of the manual's page on error: the reference, the original, a level, and where they differ.
 //!
-//! `cargo run --release --example error -- testdata/materials/pbr.wgsl 2 docs/error.png` searches the levels of a material
-//! with its scene and draws level 2 at its distance, in the first picture of the scene. From left to right: the
+//! `cargo run --release --example error -- testdata/materials/pbr.wgsl 3 docs/error.png` searches the levels of a material
+//! with its scene and draws level 3 at its distance, in the first picture of the scene. From left to right: the
 //! reference, the original, the level; below each of the two drawings its difference from the reference, four times as
 //! large, as light on black. Each pixel is a square of 6 x 6.
 
