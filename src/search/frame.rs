@@ -433,4 +433,41 @@ mod tests {
         }
         assert!(free > 2 && seen > 0, "{free} {seen}");
     }
+
+    #[test]
+    fn alpha_is_seen_where_it_is_blended_alone() {
+        let source = Source::parse(
+            "pane.wgsl",
+            "@fragment fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f {
+                 let light = uv.x * 0.9;
+                 let cover = uv.y * 0.8 + 0.1;
+                 return vec4f(vec3f(light), cover);
+             }",
+        )
+        .expect("it parses");
+        let base = normal_form(&source).expect("it is small");
+        for (line, seen) in [("", false), ("blend = \"alpha\"", true)] {
+            let text = format!("resolution = [32, 32]\n{line}\n");
+            let scene = Scene::resolve(&source, Some((Path::new("a.toml"), &text)));
+            let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+            let stage = scene.vertex_stage.as_ref().expect("lodc supplies one");
+            let vertex = Program::compile(&stage.module, 0, &[]).expect("it is plain");
+            let stand = Stand {
+                base: &base,
+                vertex: &vertex,
+                scene: &scene,
+            };
+            let set = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
+            let candidates = lodc_passes::recipe::candidates(&base, &set.facts(&base));
+            let after = |value: &str| {
+                let mut all = candidates.iter();
+                let mean = all.find(|c| c.site.path() == value && c.choice == "mean");
+                let mean = mean.expect("it is offered");
+                let variant = lodc_passes::recipe::apply(&base, mean).expect("it applies");
+                set.measure(&variant).expect("it runs").error
+            };
+            assert_eq!(after("fs_main.cover") != set.original().error, seen);
+            assert_ne!(after("fs_main.light"), set.original().error);
+        }
+    }
 }

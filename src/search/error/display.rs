@@ -113,6 +113,38 @@ mod tests {
     }
 
     #[test]
+    fn a_white_background_comes_through_where_the_target_blends() {
+        let reinhard = linear(1.5, ToneMapping::Reinhard);
+        for (output, [light, alpha], light_through) in [
+            (Output::Display, [0.25, 0.5], 0.5),
+            (Output::Display, [0.25, 1.0], 0.0),
+            (Output::Display, [0.0, 0.0], 1.0),
+            // White cannot get brighter than white.
+            (Output::Display, [0.875, 0.0], 0.125),
+            // Encoded values are blended: 0.5 over white is 1, over black it is 0.214 of light.
+            (Output::Encoded, [0.5, 0.5], 1.0 - 0.214_041_14),
+            (Output::Encoded, [0.5, 1.0], 0.0),
+            // 3 / (1 + 3) over black leaves a quarter.
+            (reinhard, [2.0, 0.875], 0.125),
+            (reinhard, [2.0, 0.5], 0.25),
+        ] {
+            let found = through(output, [light, light, light, alpha]);
+            assert!(
+                (found[0] - light_through).abs() < 1e-6,
+                "{output:?} {light} {alpha}: {found:?}"
+            );
+        }
+        assert_eq!(
+            held(Output::Display, [2.0, -1.0, 0.5, 3.0]),
+            [1.0, 0.0, 0.5, 1.0]
+        );
+        assert_eq!(
+            held(reinhard, [2.0, -1.0, 0.5, -3.0]),
+            [2.0, -1.0, 0.5, 0.0]
+        );
+    }
+
+    #[test]
     fn what_a_display_cannot_show_is_clamped_and_nan_is_kept() {
         let outputs = [
             Output::Display,

@@ -350,6 +350,26 @@ mod tests {
     }
 
     #[test]
+    fn a_blended_pixel_is_compared_over_each_background() {
+        // Half transparent, 0.25 of premultiplied light: 0.537 over black, over white the encoding of 0.75.
+        let half = Reference::new((0..16).map(|i| {
+            let shown = ReferencePixel::new([0.25; 3], [0.5; 3]);
+            ([i % 4, i / 4], shown, 1.0)
+        }));
+        let (black, white) = (0.537_098_7_f64, 0.880_825_f64);
+        let square = |drawn: [f64; 2]| {
+            let mut tally = Tally::new(&half);
+            tally.add(&[drawn.map(|c| [c as f32; 3]); 16]);
+            Details::new([(0, tally.finish())]).error.square()
+        };
+        close(square([black, white]), 0.0);
+        // Drawn opaque in the same light, it is wrong over white alone; left out, over both.
+        close(square([black, black]), (white - black).powi(2) / 2.0);
+        let left_out = (black.powi(2) + (1.0 - white).powi(2)) / 2.0;
+        close(square([0.0, 1.0]), left_out);
+    }
+
+    #[test]
     fn a_nan_is_the_worst_error() {
         let black = reference(|_| (0.0, 1.0));
         let mut broken = [BLACK; 16];
