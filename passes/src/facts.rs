@@ -305,7 +305,14 @@ mod tests {
         for pair in [[1.0, 2.0], [1.0, 2.0], [5.0, 4.0], [1.0, 2.0]] {
             told.add(pair, 1.0);
         }
-        assert_eq!(weighed, told);
+        for i in 0..2 {
+            assert!((weighed.mean[i] - told.mean[i]).abs() < 1e-12);
+            assert!((weighed.squares[i] - told.squares[i]).abs() < 1e-12);
+        }
+        assert_eq!(
+            (weighed.weight, weighed.product),
+            (told.weight, told.product)
+        );
         // Means 2 and 2.5; 3 * 1 * 0.5 + 3 * 1.5 and so on.
         assert_eq!((weighed.mean, weighed.product), ([2.0, 2.5], 6.0));
         assert_eq!(weighed.squares, [12.0, 3.0]);
