@@ -157,7 +157,7 @@ fn a_shader_is_within_its_own_bound_everywhere() {
         );
     }
     assert!(
-        found.files.len() % 9 == 0 && !found.files.is_empty(),
+        found.files.len().is_multiple_of(9) && !found.files.is_empty(),
         "{}",
         found.files.len()
     );
