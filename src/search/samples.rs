@@ -316,10 +316,8 @@ impl<'a> SampleSet<'a> {
         let frames = self.frames.iter().enumerate();
         let places = frames.flat_map(|(i, frame)| frame.tiles().iter().map(move |tile| (i, *tile)));
         let added = details.tiles.iter().zip(&self.original.0.tiles);
-        let mut worst: Vec<(f64, (usize, (u32, u32)))> = added
-            .map(|(level, original)| level - original)
-            .zip(places)
-            .collect();
+        let added = added.map(|(level, original)| level - original);
+        let mut worst: Vec<_> = added.zip(places).collect();
         worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         worst.truncate(most);
         let least = CLOSE * self.figures_of(details).tile_limit();

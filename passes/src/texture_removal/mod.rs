@@ -431,7 +431,7 @@ impl Survey<'_> {
         let seen = ids.iter().filter_map(|id| self.facts.values.get(id));
         if seen
             .flat_map(|seen| &seen.max)
-            .any(|max| !(*max <= roughness::MOST))
+            .any(|max| max.is_nan() || *max > roughness::MOST)
         {
             return Err(Declined(format!(
                 "`{}` is seen above {}, so that it is no roughness",

@@ -77,18 +77,23 @@ impl Blend {
             Self::Alpha | Self::Additive => a,
             Self::Premultiplied => a.max(r).max(g).max(b),
         };
-        // A NaN is no share.
-        share.max(0.0).min(1.0)
+        of_one(share)
     }
 
     /// How much of what is behind a fragment is still seen.
     fn kept(self, [_, _, _, a]: [f32; 4]) -> f32 {
         match self {
             Self::Opaque => 0.0,
-            Self::Alpha | Self::Premultiplied => (1.0 - a).max(0.0).min(1.0),
+            Self::Alpha | Self::Premultiplied => of_one(1.0 - a),
             Self::Additive => 1.0,
         }
     }
+}
+
+/// A share, within 0..1. A NaN is none, which `clamp` would keep.
+#[allow(clippy::manual_clamp)]
+fn of_one(share: f32) -> f32 {
+    share.max(0.0).min(1.0)
 }
 
 /// How a draw gets into the picture.

@@ -66,12 +66,11 @@ fn collect(nodes: &[Node], ir: &Ir, parts: &[bool], opacity: &mut Opacity) {
                     }
                 }
             }
-            Node::Sample(sample) if sample.gather.is_none() => {
-                if sample.results[3].as_ref().is_some_and(is_part) {
-                    opacity
-                        .textures
-                        .insert(ir.textures[sample.texture as usize]);
-                }
+            Node::Sample(sample)
+                if sample.gather.is_none() && sample.results[3].as_ref().is_some_and(is_part) =>
+            {
+                let texture = ir.textures[sample.texture as usize];
+                opacity.textures.insert(texture);
             }
             Node::TexelLoad(load) if load.results[3].as_ref().is_some_and(is_part) => {
                 opacity.textures.insert(ir.textures[load.texture as usize]);
