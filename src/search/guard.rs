@@ -96,6 +96,62 @@ mod tests {
     use crate::eval::program::Program;
     use crate::front::Source;
     use crate::scene::Scene;
+    use crate::search::Samples;
+    use crate::search::interval::Interval;
+    use lodc_passes::recipe;
+
+    #[test]
+    fn tiles_that_spoke_against_a_variant_are_remembered() {
+        // A spot that is too small for the mean error.
+        let source = Source::parse(
+            "spot.wgsl",
+            "@fragment fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f {
+                 let spot = saturate(1.0 - 80.0 * distance(uv, vec2f(0.5)));
+                 return vec4f(vec3f(0.3 + spot * (1.0 - 0.1 * uv.x)), 1.0);
+             }",
+        )
+        .expect("it parses");
+        let base = normal_form(&source).expect("it is small");
+        let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+        let stage = scene.vertex_stage.as_ref().expect("lodc supplies one");
+        let vertex = Program::compile(&stage.module, 0, &[]).expect("it is plain");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let [near, far] = [scene.distances[1], scene.distances[2]];
+        let search = Interval::new(&stand, &[near], Samples::Search).expect("it runs");
+        let facts = search.start().facts(&base);
+        let candidates = recipe::candidates(&base, &facts);
+        let mean = candidates
+            .iter()
+            .find(|c| c.site.path() == "fs_main.spot" && c.choice == "mean")
+            .expect("it is offered");
+        let flat = recipe::apply(&base, mean).expect("it applies");
+        let measured = search.measure(&flat).expect("it runs");
+        let mut guard = Guard::new(&stand);
+        assert!(guard.allows(&flat, &measured), "{measured:?}");
+
+        let full = SampleSet::new(&stand, near, Samples::Full).expect("it runs");
+        let program = compile(&flat, &[]).expect("it runs");
+        let (details, all) = full.in_full(&program);
+        let figures = full.figures_of(&details);
+        assert!(
+            figures.strain_of_means() < 1.0 && all.strain > 1.0,
+            "{figures:?}"
+        );
+        guard.keep(&full, &details).expect("it runs");
+        assert!(!guard.allows(&flat, &measured));
+        assert!(guard.allows(&base, &search.start().original()));
+        // Some tiles say what all say.
+        assert_eq!(
+            guard.tiles[0].strain_of_tiles(&program),
+            figures.strain_of_tiles()
+        );
+        guard.start_at(far);
+        assert!(guard.allows(&flat, &measured));
+    }
 
     #[test]
     fn the_limit_follows_what_all_samples_say() {
