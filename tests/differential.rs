@@ -17,36 +17,10 @@ use naga::{Expression, Handle, Module, ShaderStage, Statement};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The materials, copied beside their textures with scenes of fewer pixels and levels, so that a search is quick.
+/// The materials with fewer pixels and levels.
 fn small_materials() -> Vec<PathBuf> {
-    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
     let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("differential");
-    for folder in ["", "textures", "lighting"] {
-        std::fs::create_dir_all(to.join(folder)).expect("the target folder can be written");
-        for entry in std::fs::read_dir(from.join(folder)).expect("the folder is there") {
-            let path = entry.expect("it can be listed").path();
-            let Some(name) = path.file_name().filter(|_| path.is_file()) else {
-                continue;
-            };
-            let copy = to.join(folder).join(name);
-            std::fs::copy(&path, &copy).expect("it can be copied");
-            if path
-                .extension()
-                .is_some_and(|extension| extension == "toml")
-            {
-                let text = std::fs::read_to_string(&path).expect("a scene is text");
-                let kept = text
-                    .lines()
-                    .filter(|line| !line.starts_with("resolution") && !line.starts_with("levels"));
-                let text: Vec<&str> = ["resolution = [64, 64]", "levels = 3"]
-                    .into_iter()
-                    .chain(kept)
-                    .collect();
-                std::fs::write(&copy, text.join("\n")).expect("it can be written");
-            }
-        }
-    }
-    fixtures::shaders(to)
+    fixtures::small_materials(&to, 64, &["levels = 3"])
 }
 
 fn read(path: &Path) -> (Source, Scene) {

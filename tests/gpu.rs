@@ -23,40 +23,9 @@ use pictures::{Apart, FILTERED, ROUNDED, STEP, drawn, evaluated, even, open, pip
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The materials, copied beside their textures with scenes of so many pixels, for a test.
-fn small_materials(test: &str, pixels: u32, more: &[&str]) -> Vec<PathBuf> {
-    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
-    let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("gpu-{test}"));
-    for folder in ["", "textures", "lighting"] {
-        std::fs::create_dir_all(to.join(folder)).expect("the target folder can be written");
-        for entry in std::fs::read_dir(from.join(folder)).expect("the folder is there") {
-            let path = entry.expect("it can be listed").path();
-            let Some(name) = path.file_name().filter(|_| path.is_file()) else {
-                continue;
-            };
-            let copy = to.join(folder).join(name);
-            std::fs::copy(&path, &copy).expect("it can be copied");
-            if path.extension().is_some_and(|e| e == "toml") {
-                let text = std::fs::read_to_string(&path).expect("a scene is text");
-                std::fs::write(&copy, smaller(&text, pixels, more)).expect("it can be written");
-            }
-        }
-    }
-    fixtures::shaders(to)
-}
-
-/// A scene with so many pixels, and other lines of its first table.
-fn smaller(text: &str, pixels: u32, more: &[&str]) -> String {
-    let mut lines = vec![format!("resolution = [{pixels}, {pixels}]")];
-    lines.extend(more.iter().map(|line| (*line).to_owned()));
-    let said = |line: &str| line.split(" = ").next().unwrap_or_default().to_owned();
-    let keys: Vec<String> = lines.iter().map(|line| said(line)).collect();
-    lines.extend(
-        text.lines()
-            .filter(|line| !keys.contains(&said(line)))
-            .map(str::to_owned),
-    );
-    lines.join("\n")
+/// Where a test puts its materials.
+fn scratch(test: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("gpu-{test}"))
 }
 
 fn read(path: &Path) -> (Source, Scene) {
@@ -99,7 +68,7 @@ fn frames(scene: &Scene) -> Vec<Frame> {
 fn materials_are_drawn_alike(interface: &str) {
     let Some(gpu) = open(interface) else { return };
     let mut wrong = Vec::new();
-    for path in small_materials(interface, 64, &[]) {
+    for path in fixtures::small_materials(&scratch(interface), 64, &[]) {
         let (source, scene) = read(&path);
         if blends(&path, &scene) {
             continue;
@@ -210,7 +179,7 @@ fn reference(output: Output, mut fine: Picture) -> Picture {
 fn levels_are_drawn_with_the_errors_that_the_evaluator_finds() {
     let adapters: Vec<Gpu> = ["vulkan", "opengl"].into_iter().filter_map(open).collect();
     let mut wrong = Vec::new();
-    for path in small_materials("levels", 32, &["levels = 3", "offsets = 1"]) {
+    for path in fixtures::small_materials(&scratch("levels"), 32, &["levels = 3", "offsets = 1"]) {
         if adapters.is_empty() {
             break;
         }
