@@ -61,7 +61,7 @@ impl fmt::Display for Rate {
 }
 
 /// How a value goes over the surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Surface {
     /// It is the same everywhere.
     #[default]
@@ -186,26 +186,19 @@ impl Varies {
         }
     }
 
-    /// That of any function: affine inputs come out curved, at `value`.
+    /// That of any function: affine inputs come out curved, at `value`, and so does a sum of inputs that are
+    /// interpolated in different ways.
     fn bent(self, value: Value) -> Self {
         match self.surface {
-            Surface::Linear | Surface::Affine => Self {
+            Surface::Same | Surface::Flat => self,
+            Surface::Linear | Surface::Affine | Surface::Curved => Self {
                 surface: Surface::Curved,
-                curved: Some(Stop {
+                curved: self.curved.or(Some(Stop {
                     value,
                     why: Why::NotAffine,
-                }),
+                })),
                 ..self
             },
-            // A sum of things that are interpolated in different ways.
-            Surface::Curved if self.curved.is_none() => Self {
-                curved: Some(Stop {
-                    value,
-                    why: Why::NotAffine,
-                }),
-                ..self
-            },
-            _ => self,
         }
     }
 

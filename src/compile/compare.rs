@@ -5,6 +5,7 @@
 
 use super::search::{Read, Ready, vertex_program};
 use super::{Files, Request, normal_form};
+use crate::emit::control::{self, pipeline_constant};
 use crate::emit::{figure, writable};
 use crate::eval::image::{encode_png, to_byte};
 use crate::eval::program::{Program, Refused};
@@ -67,9 +68,6 @@ pub struct Compared {
 
 /// How much larger differences are drawn.
 const GAIN: u8 = 4;
-
-/// The name that emitted shaders give to what they choose a level by.
-const AUTO_LOD: &str = "autoLOD";
 
 /// Compares two shaders. `goes_on` is called whenever another picture has been drawn, or several.
 ///
@@ -263,9 +261,7 @@ fn read(request: &CompareRequest) -> Result<(Ready, Ready)> {
 
 /// Whether a shader's level is chosen by `autoLOD`.
 fn chooses(ready: &Ready) -> bool {
-    let mut settings = ready.source.module.overrides.iter();
-    settings.any(|(_, setting)| setting.name.as_deref() == Some(AUTO_LOD))
-        || ready.scene.has_auto_lod()
+    pipeline_constant(&ready.source.module).is_some() || ready.scene.has_auto_lod()
 }
 
 /// The distances that are looked at, nearest first.
@@ -312,13 +308,9 @@ const MOST_HALVINGS: f64 = 64.0;
 
 /// A source with its pipeline constant `autoLOD` set, if it has one.
 fn specialised(source: &Source, autolod: f64) -> Result<Source> {
-    let mut settings = source.module.overrides.iter();
-    let found = settings.find(|(_, setting)| setting.name.as_deref() == Some(AUTO_LOD));
-    let Some((handle, setting)) = found else {
+    let Some((handle, key)) = pipeline_constant(&source.module) else {
         return Ok(source.clone());
     };
-    // A constant with a number is known by its number alone.
-    let key = setting.id.map_or(AUTO_LOD.to_owned(), |id| id.to_string());
     let constants = [(key, autolod)].into_iter().collect();
     let made = process_overrides(&source.module, &source.info, None, &constants);
     let (module, info) = made.map_err(|error| {
@@ -381,7 +373,7 @@ fn warnings(request: &CompareRequest, a: &Scene, b: &Scene, chooses: bool) -> Ve
             _ => "it changes nothing",
         };
         warnings.push(
-            *Diagnostic::warning(format!("`{other}` declares no `{AUTO_LOD}`: {does}"))
+            *Diagnostic::warning(format!("`{other}` declares no `{}`: {does}", control::NAME))
                 .with_note("a shader that lodc emitted has one, unless it has the form `files`"),
         );
     }

@@ -5,6 +5,8 @@ use super::body::Body;
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
 use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
+#[cfg(feature = "search")]
+use naga::{Handle, Override};
 
 /// Where a level is chosen by.
 pub(crate) struct Control {
@@ -19,7 +21,17 @@ pub(crate) struct Control {
 }
 
 /// The name that the host knows.
-const NAME: &str = "autoLOD";
+pub(crate) const NAME: &str = "autoLOD";
+
+/// A module's pipeline constant of that name, and the key that it is set by: one with a number is known by its number
+/// alone.
+#[cfg(feature = "search")]
+pub(crate) fn pipeline_constant(module: &Module) -> Option<(Handle<Override>, String)> {
+    let mut constants = module.overrides.iter();
+    let (handle, constant) = constants.find(|(_, c)| c.name.as_deref() == Some(NAME))?;
+    let key = constant.id.map_or(NAME.to_owned(), |id| id.to_string());
+    Some((handle, key))
+}
 
 impl Control {
     /// Finds the author's, or makes one in this form.

@@ -13,7 +13,7 @@
 mod alone;
 mod body;
 mod composed;
-mod control;
+pub(crate) mod control;
 mod lines;
 mod lock;
 mod print;

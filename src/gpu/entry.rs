@@ -553,6 +553,13 @@ pub(super) fn place_variable(
     module.global_variables.append(place, Span::UNDEFINED)
 }
 
+/// All functions of a module, those of entry points last.
+pub(super) fn functions(module: &mut Module) -> impl Iterator<Item = &mut Function> {
+    let of_entries = module.entry_points.iter_mut().map(|e| &mut e.function);
+    let others = module.functions.iter_mut().map(|(_, function)| function);
+    others.chain(of_entries)
+}
+
 fn insert(module: &mut Module, inner: TypeInner) -> Handle<Type> {
     module
         .types

@@ -41,13 +41,7 @@ pub(super) fn hide_uniforms(module: &mut Module, place: (u32, u32)) {
         module.global_variables[*handle].ty = ty;
     }
     let place = entry::place_variable(module, place);
-    let of_entries = module.entry_points.iter_mut().map(|e| &mut e.function);
-    for function in module
-        .functions
-        .iter_mut()
-        .map(|(_, f)| f)
-        .chain(of_entries)
-    {
+    for function in entry::functions(module) {
         take_first(function, &hidden, place);
     }
 }

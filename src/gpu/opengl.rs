@@ -3,6 +3,7 @@
 //! Its shading language has no load from what WGSL calls a depth texture, since there that is a comparing sampler.
 //! Textures that are compared too, or handed to functions, stay as they are, and the driver says that it cannot.
 
+use super::entry;
 use lodc_passes::operands;
 use naga::{
     Block, Expression, Function, GlobalVariable, Handle, ImageClass, Module, ScalarKind, Span,
@@ -57,13 +58,7 @@ pub(super) fn load_depths(module: &mut Module) {
             .insert(Type { name: None, inner }, Span::UNDEFINED);
         module.global_variables[*handle].ty = ty;
     }
-    let of_entries = module.entry_points.iter_mut().map(|e| &mut e.function);
-    for function in module
-        .functions
-        .iter_mut()
-        .map(|(_, f)| f)
-        .chain(of_entries)
-    {
+    for function in entry::functions(module) {
         take_first(function, &loaded);
     }
 }

@@ -10,6 +10,7 @@ use super::entry::{self, Colour, Place, Targets};
 use super::resources::{self, Bound, Slot, Slots, Uploads};
 use super::vertices::Layout;
 use super::{lavapipe, opengl};
+use crate::emit::control::pipeline_constant;
 use crate::eval::draw::{Blend, Format, Plane};
 use crate::eval::raster::Frame;
 use crate::front::Source;
@@ -562,14 +563,11 @@ fn without_overrides(module: &Module, at: usize, auto_lod: Option<f64>) -> Resul
     let (stage, name) = (entry.stage, &*entry.name);
     let mut constants = PipelineConstants::default();
     if let Some(value) = auto_lod {
-        let mut names = module.overrides.iter().map(|(_, o)| o.name.as_deref());
-        if !names.any(|name| name == Some("autoLOD")) {
-            return Err(
-                Diagnostic::error("the shader has no override constant `autoLOD`")
-                    .with_note("`--form override` writes one"),
-            );
-        }
-        constants.insert("autoLOD".to_owned(), value);
+        let (_, key) = pipeline_constant(module).ok_or_else(|| {
+            Diagnostic::error("the shader has no override constant `autoLOD`")
+                .with_note("`--form override` writes one")
+        })?;
+        constants.insert(key, value);
     }
     let info = validated(module)?;
     let settled = process_overrides(module, &info, Some((stage, name)), &constants);
