@@ -5,6 +5,9 @@
 //! them is built. Without a network the tests are skipped, aloud; where `CI` is set that is a failure.
 #![cfg(all(feature = "imports", feature = "search"))]
 
+#[cfg(feature = "gpu")]
+mod pictures;
+
 use lodc::compile::{self, Request};
 use lodc::emit::{Output, emit, write_atomically};
 use lodc::eval::draw::shade;
@@ -256,4 +259,44 @@ fn there_are_levels_and_the_lock_makes_them_again() {
     let (files, warnings) = compile::locked(&again).unwrap_or_else(|error| panic!("{error}"));
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(files[0].1, text.as_bytes());
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn vulkan_draws_it_and_its_normal_form_as_the_evaluator_does() {
+    use lodc::gpu::{Renderer, Stages};
+    use pictures::{Apart, FILTERED, ROUNDED, drawn, evaluated, even, open, pipeline};
+
+    let Some(folders) = folders() else { return };
+    let Some(gpu) = open("vulkan") else { return };
+    let file = small_scene("gpu", 64);
+    let source = composed(&folders, &file, &[]);
+    let base = compile::normal_form(&source).unwrap_or_else(|error| panic!("{error}"));
+    let scene = Scene::read(&source, Some(&file)).unwrap_or_else(|error| panic!("{error}"));
+    let written = Stages::of_source(&source, &scene).expect("the mesh stage was linked");
+    let normal = Stages::of_shader(&base, &scene).expect("the mesh stage was linked");
+    let mut renderer = Renderer::new(&gpu);
+    let pipelines = [written, normal].map(|stages| pipeline(&renderer, stages, &scene));
+    let by_evaluator = pictures::programs(normal);
+    let [mut filtered, mut rounded, mut forms] = <[Apart; 3]>::default();
+    for distance in [scene.distances[0], scene.distances[1]] {
+        let frame = scene.frames(distance).swap_remove(0);
+        let truth = evaluated(&by_evaluator, &scene, &frame);
+        let [written, normal] = pipelines
+            .each_ref()
+            .map(|pipeline| drawn(&mut renderer, pipeline, &scene, &frame));
+        filtered.add(scene.output, &written, &truth);
+        forms.add(scene.output, &normal, &written);
+        let even = even(&frame);
+        let truth = evaluated(&by_evaluator, &scene, &even);
+        let written = drawn(&mut renderer, &pipelines[0], &scene, &even);
+        rounded.add(scene.output, &written, &truth);
+    }
+    let judged = [
+        filtered.judge("vulkan Bevy", FILTERED),
+        rounded.judge("vulkan Bevy, even textures", ROUNDED),
+        forms.judge("vulkan Bevy, its normal form", ROUNDED),
+    ];
+    let wrong: Vec<String> = judged.into_iter().flatten().collect();
+    assert!(wrong.is_empty(), "too far apart:\n{}", wrong.join("\n"));
 }
