@@ -9,6 +9,7 @@
 //! // facts: fs_main.size min 0.5 max 0.9 mean 0.7      one number for all components, or one for each
 //! // facts: fs_main.rare unseen                          or count 16: by fewer samples than others
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
+//! // facts: fixed material.flags 5                     stated by the scene; a float has a point
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
 //! ```
 //!
@@ -141,6 +142,10 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                 facts.dynamic.insert(path.into());
                 Some(())
             }
+            ["fixed", path, ref numbers @ ..] => {
+                let words: Option<Vec<u32>> = numbers.iter().map(|number| word(number)).collect();
+                words.map(|words| drop(facts.fixed.insert(path.into(), words)))
+            }
             [path, "unseen"] => facts.values.remove(&id(shader, path)).map(drop),
             [path, ..] => facts
                 .values
@@ -151,6 +156,14 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
         read.ok_or_else(|| line.to_owned())?;
     }
     Ok(facts)
+}
+
+/// The bits of a number: of a float when it has a point.
+fn word(number: &str) -> Option<u32> {
+    match number.contains('.') {
+        true => number.parse().ok().map(f32::to_bits),
+        false => number.parse().ok().map(i32::cast_unsigned),
+    }
 }
 
 fn id(shader: &Shader, path: &str) -> ValueId {

@@ -34,13 +34,25 @@ pub(crate) fn numbers(flow: &Flow, value: Value) -> Option<Vec<f32>> {
 /// # Errors
 /// When an operation that is constant then would be infinite, undefined or forbidden.
 pub(crate) fn follow(flow: &Flow, become_constant: &[(Value, &[f32])]) -> Result<(), Declined> {
+    let bits = |numbers: &[f32]| numbers.iter().map(|number| number.to_bits()).collect();
+    let become_constant = become_constant.iter();
+    follow_words(flow, become_constant.map(|(value, n)| (*value, bits(n))))
+}
+
+/// Checks what follows when values become constants of these bits, one word a component.
+///
+/// # Errors
+/// As [`follow`].
+pub(crate) fn follow_words(
+    flow: &Flow,
+    become_constant: impl IntoIterator<Item = (Value, Vec<u32>)>,
+) -> Result<(), Declined> {
     let mut known: BTreeMap<Value, Constant> = BTreeMap::new();
     let mut next = BTreeSet::new();
-    for (value, numbers) in become_constant {
-        if let Some(shape) = Shape::of(flow.inner(*value)) {
-            let words = numbers.iter().map(|number| number.to_bits()).collect();
-            known.insert(*value, Constant { shape, words });
-            next.extend(flow.users(*value));
+    for (value, words) in become_constant {
+        if let Some(shape) = Shape::of(flow.inner(value)) {
+            known.insert(value, Constant { shape, words });
+            next.extend(flow.users(value));
         }
     }
     // Operands come before users, so that each value is settled when it is met.

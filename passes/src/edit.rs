@@ -9,6 +9,7 @@ use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
 use crate::normalize::{names, split};
 use crate::operands::{self, User};
+use crate::semantics::{Constant, Shape};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
     Arena, Block, EntryPoint, Expression, Function, Handle, Literal, Module, Scalar, Span,
@@ -29,6 +30,9 @@ pub enum New {
     /// A constant of the old value's type, which is a scalar, vector or matrix of f32: as many numbers
     /// as that has components, a matrix column by column.
     Numbers(Vec<f32>),
+    /// A constant of the old value's type, which is a scalar, vector or matrix of 32-bit numbers or of bools: the bits of
+    /// each component, a matrix column by column, a bool as 0 or 1.
+    Words(Vec<u32>),
 }
 
 /// A change of one function, being described.
@@ -109,42 +113,44 @@ impl<'a> Edit<'a> {
     fn value(&mut self, old: Handle<Expression>, new: New) -> Handle<Expression> {
         match new {
             New::Value(value) => value,
-            New::Numbers(numbers) => self.constant(old, &numbers),
+            New::Numbers(numbers) => {
+                let words: Vec<u32> = numbers.iter().map(|number| number.to_bits()).collect();
+                self.constant(old, &words)
+            }
+            New::Words(words) => self.constant(old, &words),
         }
     }
 
     /// A constant of the type of `like`.
-    fn constant(&mut self, like: Handle<Expression>, numbers: &[f32]) -> Handle<Expression> {
+    fn constant(&mut self, like: Handle<Expression>, words: &[u32]) -> Handle<Expression> {
         let path = format!("{}.constant", self.shader.id(self.stage, like).path());
         let inner = self.shader.type_of(self.stage, like);
-        let count = match *inner {
-            TypeInner::Scalar(Scalar::F32) => 1,
-            TypeInner::Vector {
-                size,
-                scalar: Scalar::F32,
-            } => size as usize,
-            TypeInner::Matrix {
-                columns,
-                rows,
-                scalar: Scalar::F32,
-            } => columns as usize * rows as usize,
-            ref other => panic!("{path}: numbers cannot replace a value of type {other:?}"),
+        let constant = Shape::of(inner).map(|shape| Constant {
+            shape,
+            words: words.to_vec(),
+        });
+        let Some(constant) = constant else {
+            panic!("{path}: a constant cannot replace a value of type {inner:?}");
         };
         assert_eq!(
-            count,
-            numbers.len(),
+            constant.shape.components(),
+            words.len(),
             "{path}: as many numbers as components"
         );
+        let literals = constant.literals();
+        let literals = literals.unwrap_or_else(|| panic!("{path}: {words:x?} are not all finite"));
         match *inner {
-            TypeInner::Vector { size, .. } => self.constant_vector(&path, size, numbers),
+            TypeInner::Vector { size, scalar } => {
+                self.constant_vector(&path, size, scalar, &literals)
+            }
             TypeInner::Matrix {
                 columns,
                 rows,
                 scalar,
             } => {
-                let components = numbers
+                let components = literals
                     .chunks(rows as usize)
-                    .map(|column| self.constant_vector(&path, rows, column))
+                    .map(|column| self.constant_vector(&path, rows, scalar, column))
                     .collect();
                 let ty = self.ty(TypeInner::Matrix {
                     columns,
@@ -153,7 +159,7 @@ impl<'a> Edit<'a> {
                 });
                 self.add(path, Expression::Compose { ty, components })
             }
-            _ => self.add(path, Expression::Literal(Literal::F32(numbers[0]))),
+            _ => self.add(path, Expression::Literal(literals[0])),
         }
     }
 
@@ -161,15 +167,13 @@ impl<'a> Edit<'a> {
         &mut self,
         path: &str,
         size: VectorSize,
-        numbers: &[f32],
+        scalar: Scalar,
+        literals: &[Literal],
     ) -> Handle<Expression> {
-        let ty = self.ty(TypeInner::Vector {
-            size,
-            scalar: Scalar::F32,
-        });
-        let components = numbers
+        let ty = self.ty(TypeInner::Vector { size, scalar });
+        let components = literals
             .iter()
-            .map(|number| self.add(path, Expression::Literal(Literal::F32(*number))))
+            .map(|literal| self.add(path, Expression::Literal(*literal)))
             .collect();
         self.add(path, Expression::Compose { ty, components })
     }

@@ -16,6 +16,9 @@ pub struct Facts {
     pub textures: BTreeMap<String, TextureFacts>,
     /// The uniforms that may take any value, by their paths, such as `lights.items[2].colour`.
     pub dynamic: BTreeSet<String>,
+    /// What the scene states of numbers, vectors and matrices in buffers, by their paths: the bits of each component, a matrix
+    /// column by column.
+    pub fixed: BTreeMap<String, Vec<u32>>,
     /// For values and operands of theirs, how the one goes with the other: for each of the value's components.
     pub pairs: BTreeMap<(ValueId, ValueId), Vec<Moments>>,
 }

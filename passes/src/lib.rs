@@ -22,6 +22,7 @@ pub mod rate;
 pub mod recipe;
 pub mod semantics;
 pub mod shader;
+pub mod specialize;
 pub mod texture_removal;
 
 pub use cost::Work;
@@ -34,5 +35,9 @@ pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
 /// Every pass, in the order in which candidates are listed.
 ///
-/// Whole textures go first, because they are worth the most; then single operations.
-pub static PASSES: &[&dyn Pass] = &[&texture_removal::TextureRemoval, &op_removal::OpRemoval];
+/// What costs no error goes first; then whole textures, because they are worth the most; then single operations.
+pub static PASSES: &[&dyn Pass] = &[
+    &specialize::Specialize,
+    &texture_removal::TextureRemoval,
+    &op_removal::OpRemoval,
+];

@@ -133,6 +133,11 @@ pub trait Pass: Sync {
     fn summary(&self) -> &'static str;
     /// What a candidate of this pass may change.
     fn class(&self, candidate: &Candidate) -> Class;
+    /// Whether all that it does is of the exact tier: made before a search, so that no lossy change is credited with it, or
+    /// not at all.
+    fn is_exact(&self) -> bool {
+        false
+    }
     /// Every change that this pass thinks of, in a fixed order; those that it declines with the reason.
     fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered>;
     /// Every change that this pass could make, in a fixed order.

@@ -180,8 +180,9 @@ impl Descent<'_, '_> {
         let mut swept = false;
         loop {
             let facts = self.interval.start().facts(&current.shader);
-            let candidates: Vec<Candidate> = PASSES
-                .iter()
+            // What is exact was done before, or is not wanted.
+            let passes = PASSES.iter().filter(|pass| !pass.is_exact());
+            let candidates: Vec<Candidate> = passes
                 .flat_map(|pass| pass.candidates(&current.shader, &facts))
                 .collect();
             let mut step = Step {

@@ -1,0 +1,249 @@
+//! specialize: what the scene fixes is folded into the shader, and what that leaves without effect goes.
+//!
+//! Precondition. For `fixed`, the site is a load of a uniform, or of a read-only storage buffer, in the fragment stage, and
+//! the scene states what is there: the facts hold its words. Behind an index that varies all elements hold the same.
+//! For `absent`, the site is an operation on floats of which an operand is known to be 0 or 1, in every component.
+//!
+//! Effect. `fixed <place>`: every load of that place becomes the constant that the candidate bakes, bit for bit; normal
+//! form then folds what is made of constants, so that a test of a flag goes with the side that is not taken, and a loop
+//! that has no round with its body. The site is the first of the loads; the place reads like
+//! `lighting.lights[*].intensity`. Integers are not baked, as that is for floats, but stand behind the place: `fixed material.flags 5u`. `absent`: `x * 0` becomes 0, `x * 1`, `x / 1`, `x + 0`, `x - 0` and `mix(x, y, 0)` become `x`,
+//! and so for the other order, `mix(x, y, 1)`, `fma` and `dot`. What fed the part that goes is dropped, unless something else needs it.
+//!
+//! Error. None: constants are folded by the table that the evaluator runs on. What `absent` leaves out may differ in the sign of a
+//! zero. 0 times an infinity or a NaN is a NaN; that a picture would show it is what the samples tell.
+//!
+//! Declines.
+//! - A uniform that the scene samples, computes for each picture, takes from a model or a name, or calls dynamic:
+//!   it is not thought of.
+//! - A constant that an operation cannot take: a division by 0, an index beyond the end.
+//! - `absent` where what would be multiplied by 0 was seen infinite or undefined, or was not seen. This needs facts, so it is
+//!   decided when candidates are listed, not when they are replayed.
+//!
+//! This work is based on: Neil D. Jones, Carsten K. Gomard, Peter Sestoft, "Partial Evaluation and Automatic Program
+//! Generation", 1993, chapter 1; Brian Guenter, Todd B. Knoblock, Erik Ruf, "Specializing Shaders", 1995.
+
+mod absent;
+mod place;
+
+use crate::edit::{Edit, New};
+use crate::flow::{Flow, Value};
+use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
+use crate::semantics::Shape;
+use crate::shader::{Shader, Stage};
+use crate::{Facts, constants};
+use absent::Absent;
+use naga::{Expression, ScalarKind};
+use place::Place;
+
+/// The stage that is specialised: levels share the vertex stage of the source.
+const STAGE: Stage = Stage::Fragment;
+
+/// The pass.
+pub struct Specialize;
+
+/// What is done at a site: the only place where the words of this pass are read.
+enum Choice<'a> {
+    /// Loads of this place become a constant: of these integers, or of the floats that the candidate bakes.
+    Fixed(&'a str, Vec<u32>),
+    /// An operation does without what a 0 or a 1 makes pointless.
+    Absent,
+}
+
+impl<'a> Choice<'a> {
+    fn parse(choice: &'a str) -> Result<Self, Declined> {
+        let unknown = || Declined(format!("specialize has no choice `{choice}`"));
+        let mut parts = choice.split(' ');
+        match (parts.next(), parts.next()) {
+            (Some("fixed"), Some(place)) => {
+                let integers = parts.map(integer).collect::<Option<_>>();
+                Ok(Self::Fixed(place, integers.ok_or_else(unknown)?))
+            }
+            (Some("absent"), None) => Ok(Self::Absent),
+            _ => Err(unknown()),
+        }
+    }
+
+    /// The words of a choice that fixes a place, and what is baked beside them.
+    fn fixed(place: &str, kind: ScalarKind, words: Vec<u32>) -> (String, Vec<u32>) {
+        let sign = match kind {
+            ScalarKind::Float => return (format!("fixed {place}"), words),
+            ScalarKind::Sint => 'i',
+            _ => 'u',
+        };
+        let mut choice = format!("fixed {place}");
+        for word in words {
+            let number = match kind {
+                ScalarKind::Sint => i64::from(word.cast_signed()),
+                _ => i64::from(word),
+            };
+            choice.push_str(&format!(" {number}{sign}"));
+        }
+        (choice, Vec::new())
+    }
+}
+
+/// The bits of an integer as WGSL writes it: `5u`, `-2i`.
+fn integer(text: &str) -> Option<u32> {
+    match text.strip_suffix('u') {
+        Some(digits) => digits.parse().ok(),
+        None => {
+            let number: i32 = text.strip_suffix('i')?.parse().ok()?;
+            Some(number.cast_unsigned())
+        }
+    }
+}
+
+impl Pass for Specialize {
+    fn name(&self) -> &'static str {
+        "specialize"
+    }
+
+    fn summary(&self) -> &'static str {
+        "what the scene fixes is folded, and what that leaves without effect goes"
+    }
+
+    fn class(&self, _: &Candidate) -> Class {
+        Class::Lossless
+    }
+
+    fn is_exact(&self) -> bool {
+        true
+    }
+
+    fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered> {
+        let Some(flow) = Flow::new(shader, STAGE) else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        let mut consider = |site: Value, (choice, value), verdict: Result<(), Declined>| {
+            let declined = verdict.err();
+            found.push(Considered {
+                candidate: Candidate {
+                    pass: Self.name().into(),
+                    site: flow.id(site).clone(),
+                    choice,
+                    value,
+                },
+                declined,
+            });
+        };
+        let mut places: Vec<String> = Vec::new();
+        for (site, _) in flow.function.expressions.iter() {
+            let Some(place) = Place::loaded(&flow, site) else {
+                continue;
+            };
+            if places.contains(&place.path) {
+                continue;
+            }
+            if let Some(words) = place.words(facts) {
+                let loads = loads(&flow, &place.path);
+                let verdict = becomes_constant(&flow, &loads, &words);
+                let kind = Shape::of(flow.inner(site)).map_or(ScalarKind::Float, Shape::kind);
+                let (choice, value) = Choice::fixed(&place.path, kind, words);
+                let value = if verdict.is_ok() { value } else { Vec::new() };
+                consider(site, (choice, value), verdict);
+            }
+            places.push(place.path);
+        }
+        for (site, _) in flow.function.expressions.iter() {
+            if let Some(absent) = Absent::of(&flow, site) {
+                let verdict = absent.is_harmless(&flow, facts);
+                consider(site, ("absent".into(), Vec::new()), verdict);
+            }
+        }
+        found
+    }
+
+    fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
+        plan(shader, candidate).map(drop)
+    }
+
+    fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader {
+        match plan(shader, candidate) {
+            Ok(changes) => {
+                let mut edit = Edit::new(shader, STAGE);
+                for (value, new) in changes {
+                    edit.replace(value, new);
+                }
+                edit.finish()
+            }
+            Err(declined) => panic!("{candidate} was applied, but {declined}"),
+        }
+    }
+}
+
+/// What a candidate replaces by what.
+fn plan(shader: &Shader, candidate: &Candidate) -> Result<Vec<(Value, New)>, Declined> {
+    let choice = Choice::parse(&candidate.choice)?;
+    let (stage, site) = shader
+        .find(&candidate.site)
+        .ok_or_else(|| Declined(format!("there is no value `{}`", candidate.site.path())))?;
+    let flow = (stage == STAGE)
+        .then(|| Flow::new(shader, stage))
+        .flatten()
+        .ok_or_else(|| Declined("only the fragment stage is specialised".into()))?;
+    match choice {
+        Choice::Fixed(path, integers) => {
+            if Place::loaded(&flow, site).is_none_or(|place| place.path != path) {
+                return Err(Declined(format!("it is no load of `{path}`")));
+            }
+            let loads = loads(&flow, path);
+            let is_float = flow.is_float(site);
+            let words = match integers.is_empty() {
+                true if is_float => &candidate.value,
+                false if !is_float && candidate.value.is_empty() => &integers,
+                _ => return Err(Declined("it bakes numbers of another kind".into())),
+            };
+            becomes_constant(&flow, &loads, words)?;
+            let constant = |load| (load, New::Words(words.clone()));
+            Ok(loads.into_iter().map(constant).collect())
+        }
+        Choice::Absent => {
+            if !candidate.value.is_empty() {
+                return Err(Declined("it bakes no numbers".into()));
+            }
+            let absent = Absent::of(&flow, site)
+                .ok_or_else(|| Declined("no 0 or 1 makes a part of it pointless".into()))?;
+            Ok(vec![(site, absent.becomes(&flow, site))])
+        }
+    }
+}
+
+/// The loads of a place, in arena order.
+fn loads(flow: &Flow, path: &str) -> Vec<Value> {
+    let values = flow.function.expressions.iter().map(|(value, _)| value);
+    values
+        .filter(|value| Place::loaded(flow, *value).is_some_and(|place| place.path == path))
+        .collect()
+}
+
+/// Checks that loads may become a constant of these words.
+fn becomes_constant(flow: &Flow, loads: &[Value], words: &[u32]) -> Result<(), Declined> {
+    for load in loads {
+        let shape = Shape::of(flow.inner(*load))
+            .ok_or_else(|| Declined("it is no number, vector or matrix of 32 bits".into()))?;
+        if shape.components() != words.len() {
+            return Err(Declined(format!(
+                "it bakes {} numbers, but the value has {}",
+                words.len(),
+                shape.components()
+            )));
+        }
+        if shape.kind() == ScalarKind::Float
+            && !words.iter().all(|word| f32::from_bits(*word).is_finite())
+        {
+            return Err(Declined("it bakes a number that is not finite".into()));
+        }
+    }
+    let become_constant = loads.iter().map(|load| (*load, words.to_vec()));
+    constants::follow_words(flow, become_constant)
+}
+
+/// Whether a value is a load, which a place may be read by.
+fn pointer(flow: &Flow, value: Value) -> Option<Value> {
+    match flow.function.expressions[value] {
+        Expression::Load { pointer } => Some(pointer),
+        _ => None,
+    }
+}
