@@ -151,6 +151,13 @@ impl Rasterised {
         self.view
     }
 
+    /// From now on what variants read of textures is remembered (see [`Coverage::remember`]).
+    pub(super) fn remember(&mut self) {
+        for drawing in &mut self.drawings {
+            drawing.coverage.remember();
+        }
+    }
+
     /// Column and row of each of its tiles.
     pub(super) fn tiles(&self) -> &[(u32, u32)] {
         self.reference.tile_places()

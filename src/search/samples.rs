@@ -166,7 +166,11 @@ impl<'a> SampleSet<'a> {
             original: Default::default(),
         });
         for of_all in rasterised {
-            for (set, frame) in sets.iter_mut().zip(of_all) {
+            for (set, mut frame) in sets.iter_mut().zip(of_all) {
+                // Full sets meet few variants, and would take too much memory.
+                if samples == Samples::Search {
+                    frame.remember();
+                }
                 set.frames.push(frame);
             }
         }

@@ -411,6 +411,7 @@ impl Job<'_> {
                 }
                 machine.weigh(&of_lanes);
             }
+            machine.recall(block.recall.as_deref());
             let kept = machine.run(inputs, block.active, block.covered, &mut outputs);
             for lane in block.covered.lanes() {
                 self.colours[fragment] = colour(&interface.colour, &outputs, lane);

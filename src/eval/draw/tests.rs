@@ -20,6 +20,7 @@ fn coverage(depths: [f32; 3]) -> Coverage {
         depths: [0.0; LANES],
         draw: 0,
         first: 0,
+        recall: None,
     };
     for ((lane, pixel), depth) in [(0, 0), (1, 1), (4, 0)].into_iter().zip(depths) {
         block.pixels[lane] = pixel;

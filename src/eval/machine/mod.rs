@@ -10,6 +10,7 @@
 )]
 
 mod kernels;
+mod recall;
 mod textures;
 
 use super::lane::{LANES, Lane, Mask, Words};
@@ -27,6 +28,7 @@ use textures::Scratch;
 
 pub use kernels::Kernels;
 use kernels::{Registers, Vectors};
+pub use recall::Recall;
 
 /// Rounds of all loops together that a block may take; a shader that wants more is taken to
 /// never end.
@@ -168,6 +170,8 @@ pub struct Machine<'a, R = f32> {
     buffers: Vec<&'a [u8]>,
     textures: Vec<&'a Texture>,
     samplers: Vec<&'a Sampler>,
+    /// What earlier programs have read in the block that comes.
+    recall: Option<&'a Recall>,
     registers: Registers<R>,
     scratch: Scratch,
     vectors: Option<Vectors>,
@@ -258,6 +262,7 @@ impl<'a, R: Lane> Machine<'a, R> {
                     _ => wrong(at, "sampler"),
                 })
                 .collect(),
+            recall: None,
             registers: Registers::new(code.registers),
             scratch: Scratch::default(),
             vectors: Vectors::detect(),
@@ -302,6 +307,11 @@ impl<'a, R: Lane> Machine<'a, R> {
     /// Says what each lane of the next blocks weighs in probes, 0 or more.
     pub fn weigh(&mut self, weights: &[f32; LANES]) {
         **self.weights.get_or_insert_with(|| Box::new([1.0; LANES])) = *weights;
+    }
+
+    /// Says what is remembered of the textures in the next block, if anything.
+    pub fn recall(&mut self, recall: Option<&'a Recall>) {
+        self.recall = recall;
     }
 
     /// Runs one block. `inputs` has one entry per slot of [`Program::inputs`], `outputs` one per slot

@@ -118,7 +118,10 @@ impl<R: Lane> Machine<'_, R> {
         };
         let out = &mut self.scratch.results;
         clear(out, self.mask);
-        texture.sample(sampler, &request, self.mask, out);
+        match self.recall {
+            Some(recall) => recall.sample(texture, sampler, &request, self.mask, out),
+            None => texture.sample(sampler, &request, self.mask, out),
+        }
         self.take_results(&sample.results);
     }
 

@@ -22,7 +22,7 @@ pub(crate) use vertices::attribute;
 
 use super::draw::{Blend, DrawState, state_of};
 use super::lane::{LANES, Mask, Words};
-use super::machine::{Bindings, Profile};
+use super::machine::{Bindings, Profile, Recall};
 use super::program::{Program, Slot};
 use crate::scene::camera::Shot;
 use crate::scene::mesh::Mesh;
@@ -125,6 +125,8 @@ pub struct Block {
     pub draw: usize,
     /// The place of the first covered fragment among all of [`Coverage::fragments`].
     pub first: usize,
+    /// What is remembered of the textures between the programs that are run over it.
+    pub recall: Option<Arc<Recall>>,
 }
 
 /// Runs the vertex program over the mesh and finds the fragments of the frame.
@@ -206,6 +208,14 @@ impl Coverage {
     /// How a draw gets into the picture.
     pub(crate) fn state(&self, draw: usize) -> DrawState {
         state_of(&self.states, draw)
+    }
+
+    /// From now on what programs read of textures is remembered, which takes some 200 KiB a block. All are to be run with
+    /// the same resources, which live as long as this.
+    pub(crate) fn remember(&mut self) {
+        for block in &mut self.blocks {
+            block.recall = Some(Arc::default());
+        }
     }
 
     /// Whether fragments are blended.

@@ -53,6 +53,7 @@ impl Coverage {
                         depths: [0.0; LANES],
                         draw: block.draw,
                         first: fragments,
+                        recall: None,
                     };
                     (empty, 0)
                 });

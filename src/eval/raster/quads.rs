@@ -165,6 +165,7 @@ fn block(
         depths: [0.0; LANES],
         draw,
         first: 0,
+        recall: None,
     };
     let linear = sources
         .iter()
