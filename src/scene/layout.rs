@@ -46,17 +46,22 @@ impl Leaf {
         }
     }
 
+    /// The bits of its numbers, column by column.
+    pub(super) fn words(&self, numbers: &[f64]) -> impl Iterator<Item = u32> {
+        let numbers = numbers.iter().take(self.len());
+        numbers.map(|&number| match self.kind {
+            ScalarKind::Sint => (number as i32).cast_unsigned(),
+            ScalarKind::Uint => number as u32,
+            ScalarKind::Bool => u32::from(number != 0.0),
+            _ => (number as f32).to_bits(),
+        })
+    }
+
     /// Writes its numbers, column by column, into the bytes of its buffer.
     pub(super) fn write(&self, numbers: &[f64], bytes: &mut [u8]) {
-        for (i, &number) in numbers.iter().take(self.len()).enumerate() {
+        for (i, word) in self.words(numbers).enumerate() {
             let (column, row) = ((i / self.rows) as u32, (i % self.rows) as u32);
             let at = (self.offset + column * self.stride + row * 4) as usize;
-            let word = match self.kind {
-                ScalarKind::Sint => (number as i32).cast_unsigned(),
-                ScalarKind::Uint => number as u32,
-                ScalarKind::Bool => u32::from(number != 0.0),
-                _ => (number as f32).to_bits(),
-            };
             if let Some(place) = bytes.get_mut(at..at + 4) {
                 place.copy_from_slice(&word.to_le_bytes());
             }

@@ -20,6 +20,10 @@ impl SampleSet<'_> {
     pub fn facts(&self, shader: &Shader) -> Facts {
         let uniforms = self.stand.scene.uniforms.iter();
         let dynamic = uniforms.filter(|uniform| uniform.variation == Variation::Dynamic);
+        let stated = self.stand.scene.uniforms.iter().filter_map(|uniform| {
+            let words = uniform.stated.clone()?;
+            Some((uniform.path.clone(), words))
+        });
         let probes = float_values(shader);
         let pairs = op_removal::pairs(shader);
         // A shader always has a fragment stage.
@@ -31,6 +35,7 @@ impl SampleSet<'_> {
         let mut facts = Facts {
             textures: texture_facts(self.stand.scene, self.distance(), &opacity),
             dynamic: dynamic.map(|uniform| uniform.path.clone()).collect(),
+            fixed: stated.collect(),
             ..Facts::default()
         };
         let compiled = Program::compile_with_pairs(shader.module(), entry, &probes, &pairs);

@@ -5,6 +5,8 @@
 //! memory holds. Which stores and values nobody needs is for [`crate::live`] to find out afterwards.
 //! Nothing is computed earlier than it was, but for a few cheap operations behind `&&` and `||`.
 
+mod rounds;
+
 use crate::fold;
 use crate::semantics::{Constant, Operation, Shape};
 use crate::{fingerprint::Declared, operands};
@@ -15,6 +17,7 @@ use naga::{
     StorageAccess, SwitchCase, SwitchValue, SwizzleComponent, Type, TypeInner, UnaryOperator,
     VectorSize,
 };
+use rounds::{Rounds, is_break};
 use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasher, Hasher};
 
@@ -1899,6 +1902,27 @@ impl Forward<'_> {
         break_if: Option<Handle<Expression>>,
         span: Span,
     ) -> Flow {
+        if let Some(rounds) = self.rounds(body, continuing, break_if) {
+            self.folded();
+            return match rounds {
+                Rounds::None => Flow::Falls,
+                // Inside are no jumps but the test, so that it does not matter that the loop is not around any more.
+                Rounds::One { test } => {
+                    for (at, (statement, span)) in body.span_iter().enumerate() {
+                        let flow = match statement {
+                            Statement::If { accept, reject, .. } if Some(at) == test => {
+                                self.statements(if is_break(accept) { reject } else { accept })
+                            }
+                            other => self.statement(other, *span),
+                        };
+                        if flow == Flow::Jumps {
+                            return flow;
+                        }
+                    }
+                    self.statements(continuing)
+                }
+            };
+        }
         self.flush();
         let expressions = self.expressions;
         for block in [body, continuing] {

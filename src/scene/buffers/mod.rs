@@ -107,6 +107,8 @@ pub struct Uniform {
     pub variation: Variation,
     /// What the scene computes it from, if it does.
     pub semantic: Option<Semantic>,
+    /// What the scene file states it to be, always: the bits of each component, a matrix column by column.
+    pub stated: Option<Vec<u32>>,
 }
 
 impl Buffer {
@@ -218,6 +220,10 @@ impl Buffer {
             variation: fill.variation(),
             semantic: match fill {
                 Fill::Semantic(semantic) => Some(*semantic),
+                _ => None,
+            },
+            stated: match fill {
+                Fill::Fixed(numbers) if leaf.width == 4 => Some(leaf.words(numbers).collect()),
                 _ => None,
             },
         })
