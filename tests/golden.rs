@@ -1,7 +1,8 @@
 //! Golden files: what each pass makes of each of its fixtures, as full-context diffs.
 //!
 //! Beside `testdata/passes/<pass>/<case>.wgsl` lies `<case>.diff`: for every candidate in order, the
-//! fragment stage before and after, as it would be emitted; for what the pass declines, the reason.
+//! fragment stage before and after, as it would be emitted, of a pass that changes both stages both; for what the pass
+//! declines, the reason.
 //! A fixture may open with comments that are read here:
 //!
 //! ```text
@@ -25,7 +26,7 @@ use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
 use lodc_passes::facts::{Facts, ValueFacts};
-use lodc_passes::{PASSES, Pass, Shader, ValueId};
+use lodc_passes::{PASSES, Pass, Shader, UNSEARCHED, ValueId};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -33,7 +34,7 @@ use std::path::Path;
 #[test]
 fn passes_do_to_their_fixtures_what_the_goldens_say() {
     let mut goldens = Goldens::of("golden");
-    for pass in PASSES {
+    for pass in PASSES.iter().chain(UNSEARCHED) {
         for path in fixtures::shaders(Path::new("testdata/passes").join(pass.name())) {
             let (golden, offered) = golden(*pass, &path);
             let name = format!(
@@ -65,7 +66,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
-    let before = fragment_stage(&source, &shader);
+    let stages = |shader: &Shader| stages(&source, shader, pass.name() == "vertex-motion");
+    let before = stages(&shader);
     let mut golden = String::new();
     let mut offered = 0;
     for considered in pass.consider(&shader, &facts) {
@@ -81,7 +83,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
             Ok(()),
             "{name}: {candidate}"
         );
-        let after = fragment_stage(&source, &pass.apply(&shader, &candidate));
+        let after = stages(&pass.apply(&shader, &candidate));
         assert_ne!(before, after, "{name}: {candidate} changes nothing");
         golden.push_str(&fixtures::whole_diff(&before, &after));
         golden.push('\n');
@@ -92,8 +94,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     (golden.trim_end().to_owned() + "\n", offered)
 }
 
-/// The text of a variant's fragment stage, as emitted.
-fn fragment_stage(source: &Source, shader: &Shader) -> String {
+/// The text of a variant's fragment stage, or of both with what they declare, as emitted.
+fn stages(source: &Source, shader: &Shader, both: bool) -> String {
     let level = EmitLevel {
         autolod: 1.0,
         shader: shader.clone(),
@@ -110,8 +112,11 @@ fn fragment_stage(source: &Source, shader: &Shader) -> String {
         emit::emit(source, &[level], output).unwrap_or_else(|e| panic!("{}: {e}", source.name));
     let (_, bytes) = files.last().expect("one file a level");
     let text = String::from_utf8(bytes.clone()).expect("WGSL is text");
-    let start = text.find("@fragment").expect("there is a fragment stage");
-    text[start..].to_owned()
+    let start = match both {
+        true => text.find("\n\n").map(|header| header + 2),
+        false => text.find("@fragment"),
+    };
+    text[start.expect("there is a fragment stage")..].to_owned()
 }
 
 /// The synthetic facts, changed as the fixture's comments say; the line that cannot be read otherwise.

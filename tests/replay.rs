@@ -8,7 +8,7 @@ mod synthetic;
 
 use lodc::front::Source;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
-use lodc_passes::{Facts, PASSES, Shader, Stage};
+use lodc_passes::{Facts, PASSES, Pass, Shader, Stage, UNSEARCHED};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;
@@ -46,14 +46,28 @@ struct Subject {
     facts: Facts,
 }
 
+/// Every pass.
+fn passes() -> impl Iterator<Item = &'static dyn Pass> {
+    PASSES.iter().chain(UNSEARCHED).copied()
+}
+
+/// Every candidate of every pass.
+fn offered(shader: &Shader, facts: &Facts) -> Vec<Candidate> {
+    passes()
+        .flat_map(|pass| pass.candidates(shader, facts))
+        .collect()
+}
+
 /// The materials, the adversarial shaders and the passes' fixtures, in normal form.
 fn subjects() -> Vec<Subject> {
     let mut paths = fixtures::complete();
-    for pass in PASSES {
+    let fixtures_of = |pass: &dyn Pass| {
         let folder = Path::new("testdata/passes").join(pass.name());
-        paths.extend(fixtures::shaders(folder));
-    }
+        fixtures::shaders(folder)
+    };
+    paths.extend(PASSES.iter().flat_map(|pass| fixtures_of(*pass)));
     let mut random = Random::new(paths.len());
+    paths.extend(UNSEARCHED.iter().flat_map(|pass| fixtures_of(*pass)));
     paths
         .iter()
         .map(|path| {
@@ -142,7 +156,7 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
         let mut recipe = Recipe::default();
         for _ in 0..1 + random.below(STEPS) {
             let facts = synthetic::awkward_facts(&shader, |end| random.below(end));
-            let candidates = recipe::candidates(&shader, &facts);
+            let candidates = offered(&shader, &facts);
             if candidates.is_empty() {
                 break;
             }
@@ -202,11 +216,8 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
 #[test]
 fn candidates_are_the_same_every_time_and_all_apply() {
     for subject in &subjects() {
-        let candidates = recipe::candidates(&subject.shader, &subject.facts);
-        assert_eq!(
-            candidates,
-            recipe::candidates(&subject.shader.clone(), &subject.facts)
-        );
+        let candidates = offered(&subject.shader, &subject.facts);
+        assert_eq!(candidates, offered(&subject.shader.clone(), &subject.facts));
         for (i, candidate) in candidates.iter().enumerate() {
             assert!(
                 !candidates[..i].contains(candidate),
@@ -228,7 +239,7 @@ fn any_candidate_can_be_asked_of_any_shader() {
     let subjects = subjects();
     let all: Vec<Candidate> = subjects
         .iter()
-        .flat_map(|subject| recipe::candidates(&subject.shader, &subject.facts))
+        .flat_map(|subject| offered(&subject.shader, &subject.facts))
         .collect();
     let words = [
         "",
@@ -241,6 +252,8 @@ fn any_candidate_can_be_asked_of_any_shader() {
         "fit fs_main",
         "fit-within fs_main",
         "seen-mean",
+        "affine",
+        "interpolate",
         "no such word",
     ];
     on_two_threads(20_000, |seed| {
@@ -251,11 +264,15 @@ fn any_candidate_can_be_asked_of_any_shader() {
             1 => candidate.value = vec![f32::NAN.to_bits(); random.below(6)],
             2 => candidate.value = vec![0x3f00_0000; random.below(6)],
             3 => candidate.site = all[random.below(all.len())].site.clone(),
-            4 => candidate.pass = PASSES[random.below(PASSES.len())].name().into(),
+            4 => {
+                candidate.pass = passes()
+                    .nth(random.below(PASSES.len() + UNSEARCHED.len()))
+                    .map_or(String::new(), |pass| pass.name().into())
+            }
             _ => {}
         }
         let subject = &subjects[random.below(subjects.len())];
-        for pass in PASSES {
+        for pass in passes() {
             // Asked of the wrong pass as well: an answer is all that counts.
             if pass.applies(&subject.shader, &candidate).is_ok() && pass.name() == candidate.pass {
                 let next = pass.apply(&subject.shader, &candidate);
@@ -263,6 +280,22 @@ fn any_candidate_can_be_asked_of_any_shader() {
             }
         }
     });
+}
+
+/// Whether a value that one of two edits moves is the same with the other edit made before: what has been moved is not
+/// changed any more.
+fn independent(edits: [&Candidate; 2], alone: [&Shader; 2], one: &Shader, other: &Shader) -> bool {
+    let of_vertices = |shader: &Shader| shader.fingerprint_of(Stage::Vertex);
+    match edits.map(|edit| edit.pass == "vertex-motion") {
+        [true, false] => of_vertices(alone[0]) == of_vertices(other),
+        [false, true] => of_vertices(alone[1]) == of_vertices(one),
+        // The statements of two loops stay in the order in which they were moved.
+        [true, true] => alone.iter().all(|shader| {
+            let function = shader.function(Stage::Vertex);
+            function.is_some_and(|function| function.local_variables.is_empty())
+        }),
+        [false, false] => true,
+    }
 }
 
 #[test]
@@ -276,31 +309,40 @@ fn two_orders_of_independent_edits_are_one_variant() {
             facts,
         } = &subjects[i];
         let mut random = Random::new(i);
-        let candidates = recipe::candidates(shader, facts);
+        let candidates = offered(shader, facts);
         let after: Vec<Shader> = candidates
             .iter()
             .map(|candidate| recipe::apply(shader, candidate).expect("it was offered"))
             .collect();
-        // All pairs are too many: some, spread over all.
-        let pairs = candidates.len() * candidates.len();
-        let stride = (pairs / PAIRS).max(1);
-        let mut pair = random.below(stride);
-        while pair < pairs {
-            let (first, second) = (pair / candidates.len(), pair % candidates.len());
-            pair += 1 + random.below(2 * stride - 1);
-            // Where one takes the other's site or operand away, that order is declined.
-            if first < second
-                && let Ok(one) = recipe::apply(&after[first], &candidates[second])
-                && let Ok(other) = recipe::apply(&after[second], &candidates[first])
-            {
-                assert_eq!(
-                    one.fingerprint(),
-                    other.fingerprint(),
-                    "{name}: {}; {}",
-                    candidates[first],
-                    candidates[second]
-                );
-                both_ways.fetch_add(1, Ordering::Relaxed);
+        // All pairs are too many: some, spread over all. Of those with a moved value, as many.
+        for (count, moved) in [
+            (recipe::candidates(shader, facts).len(), false),
+            (candidates.len(), true),
+        ] {
+            let pairs = count * count;
+            let stride = (pairs / PAIRS).max(1);
+            let mut pair = random.below(stride);
+            while pair < pairs {
+                let (first, second) = (pair / count, pair % count);
+                pair += 1 + random.below(2 * stride - 1);
+                let edits = [&candidates[first], &candidates[second]];
+                if moved != edits.iter().any(|edit| edit.pass == "vertex-motion") {
+                    continue;
+                }
+                // Where one takes the other's site or operand away, that order is declined.
+                if first < second
+                    && let Ok(one) = recipe::apply(&after[first], edits[1])
+                    && let Ok(other) = recipe::apply(&after[second], edits[0])
+                    && independent(edits, [&after[first], &after[second]], &one, &other)
+                {
+                    let [first, second] = edits;
+                    assert_eq!(
+                        one.fingerprint(),
+                        other.fingerprint(),
+                        "{name}: {first}; {second}"
+                    );
+                    both_ways.fetch_add(1, Ordering::Relaxed);
+                }
             }
         }
     });
@@ -420,7 +462,7 @@ fn a_recipe_finds_what_was_renamed_since() {
     };
     let (old, new) = (normal_form(text), normal_form(renamed));
     assert_eq!(old.fingerprint(), new.fingerprint());
-    for candidate in recipe::candidates(&old, &synthetic::facts(&old)) {
+    for candidate in offered(&old, &synthetic::facts(&old)) {
         let recipe = Recipe(vec![candidate]);
         let before = recipe.replay(&old).expect("it was offered");
         let after = recipe

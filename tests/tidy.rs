@@ -1,6 +1,6 @@
 //! Tests about the repository itself: one name for everything that belongs to a pass, and house rules.
 
-use lodc_passes::PASSES;
+use lodc_passes::{PASSES, UNSEARCHED};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ fn a_pass_its_file_its_struct_and_its_fixtures_share_one_name() {
     let mut folders: BTreeSet<&str> = fixtures(&files)
         .filter_map(|path| path.parent()?.file_name()?.to_str())
         .collect();
-    for pass in PASSES {
+    for pass in PASSES.iter().chain(UNSEARCHED) {
         let name = pass.name();
         let module = name.replace('-', "_");
         let file = [
@@ -97,13 +97,13 @@ fn a_pass_its_file_its_struct_and_its_fixtures_share_one_name() {
             assert!(source.contains(part), "{name}'s header has no `{part}`");
         }
         assert!(folders.remove(name), "{name} has no fixtures");
-        for prefix in ["keeps_", "drops_"] {
+        for prefixes in [&["keeps_"][..], &["drops_", "moves_"]] {
             assert!(
                 fixtures(&files).any(|path| {
                     path.parent().is_some_and(|folder| folder.ends_with(name))
-                        && stem(path).starts_with(prefix)
+                        && prefixes.iter().any(|prefix| stem(path).starts_with(prefix))
                 }),
-                "{name} has no fixture {prefix}*"
+                "{name} has no fixture {prefixes:?}"
             );
         }
     }
@@ -123,9 +123,10 @@ fn fixtures_say_what_happens_and_are_small() {
         let is_of_pass = path
             .parent()
             .is_some_and(|folder| !folder.ends_with("normalize"));
+        let says = ["keeps_", "drops_", "moves_"];
         assert!(
-            !is_of_pass || name.starts_with("keeps_") || name.starts_with("drops_"),
-            "{} starts with neither keeps_ nor drops_",
+            !is_of_pass || says.iter().any(|prefix| name.starts_with(prefix)),
+            "{} starts with neither keeps_ nor drops_ nor moves_",
             path.display()
         );
         assert!(

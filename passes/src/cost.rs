@@ -29,6 +29,10 @@ pub const SPECIAL_WEIGHT: f64 = 4.0;
 /// Fatahalian 2015, section 5.
 pub const SAMPLE_WEIGHT: f64 = 100.0;
 
+/// Full-rate scalar operations that the interpolation of one component of a fragment's input is worth: two
+/// multiplications and two additions, with the values of a triangle's corners at hand as differences.
+pub const INTERPOLATION_WEIGHT: f64 = 4.0;
+
 impl Work {
     /// Arithmetic alone, in full-rate scalar operations.
     pub fn operations(&self) -> f64 {

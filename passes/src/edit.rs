@@ -5,6 +5,7 @@
 //! it is available, and brings it to normal form again.
 
 use crate::fingerprint::Declared;
+use crate::interface::{self, Output};
 use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
 use crate::normalize::{names, split};
@@ -12,8 +13,8 @@ use crate::operands::{self, User};
 use crate::semantics::{Constant, Shape};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
-    Arena, Block, EntryPoint, Expression, Function, Handle, Literal, Module, Scalar, Span,
-    Statement, Type, TypeInner, VectorSize,
+    Arena, Block, EntryPoint, Expression, Function, FunctionArgument, Handle, Literal,
+    LocalVariable, Module, Scalar, Span, Statement, Type, TypeInner, VectorSize,
 };
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,6 +42,12 @@ pub struct Edit<'a> {
     stage: Stage,
     entry: usize,
     module: Module,
+    /// The function as it was, with the arguments, variables and names that were added.
+    function: Cow<'a, Function>,
+    /// What it returns beside what it returned.
+    outputs: Vec<(Output, Handle<Expression>)>,
+    /// What is done before it returns.
+    before_return: Block,
     /// The old values, and behind them those that were added.
     expressions: Arena<Expression>,
     /// The paths of the added values.
@@ -56,23 +63,20 @@ impl<'a> Edit<'a> {
     /// When the shader lacks the stage.
     pub fn new(shader: &'a Shader, stage: Stage) -> Self {
         let entry = shader.index(stage).expect("the shader has this stage");
+        let function = &shader.module.entry_points[entry].function;
         Self {
             shader,
             stage,
             entry,
             module: without(&shader.module, entry),
-            expressions: shader.module.entry_points[entry]
-                .function
-                .expressions
-                .clone(),
+            function: Cow::Borrowed(function),
+            outputs: Vec::new(),
+            before_return: Block::new(),
+            expressions: function.expressions.clone(),
             added: Vec::new(),
             replaced: BTreeMap::new(),
             replaced_for: BTreeMap::new(),
         }
-    }
-
-    fn function(&self) -> &'a Function {
-        &self.shader.module.entry_points[self.entry].function
     }
 
     /// An old or an added value.
@@ -86,6 +90,40 @@ impl<'a> Edit<'a> {
     pub fn add(&mut self, path: impl Into<String>, expression: Expression) -> Handle<Expression> {
         self.added.push(path.into());
         self.expressions.append(expression, Span::UNDEFINED)
+    }
+
+    /// Gives an added value the name that writers print.
+    pub(crate) fn name(&mut self, value: Handle<Expression>, name: String) {
+        self.function.to_mut().named_expressions.insert(value, name);
+    }
+
+    /// Makes a new input behind those of the function, and the value that it is, named by `path`.
+    pub(crate) fn add_argument(
+        &mut self,
+        path: impl Into<String>,
+        argument: FunctionArgument,
+    ) -> Handle<Expression> {
+        let arguments = &mut self.function.to_mut().arguments;
+        arguments.push(argument);
+        let at = arguments.len() as u32 - 1;
+        self.add(path, Expression::FunctionArgument(at))
+    }
+
+    /// Makes a new local variable. Its initial value is an added one that is made of constants.
+    pub(crate) fn add_local(&mut self, variable: LocalVariable) -> Handle<LocalVariable> {
+        let locals = &mut self.function.to_mut().local_variables;
+        locals.append(variable, Span::UNDEFINED)
+    }
+
+    /// From now on the function returns a value, an old or an added one, behind all that it returned.
+    pub(crate) fn add_output(&mut self, output: Output, value: Handle<Expression>) {
+        self.outputs.push((output, value));
+    }
+
+    /// Has statements done before the function returns, behind those that were given before. Values that they compute are
+    /// added ones, in one `Emit` each.
+    pub(crate) fn do_before_return(&mut self, mut statements: Block) {
+        self.before_return.append(&mut statements);
     }
 
     /// The handle of a type of the module, which is added when it is not there.
@@ -193,8 +231,8 @@ impl<'a> Edit<'a> {
     /// When a replacement is not computed where it is used: [`available`](Self::available) tells
     /// beforehand.
     pub fn finish(mut self) -> Shader {
-        let old = self.function();
-        let mut body = Cow::Borrowed(&old.body);
+        let base_body = &self.shader.module.entry_points[self.entry].function.body;
+        let mut body = Cow::Borrowed(base_body);
         for ((user, value), new) in &self.replaced_for {
             match *user {
                 User::Value(user) => {
@@ -219,6 +257,10 @@ impl<'a> Edit<'a> {
                 }
             }
         }
+        if !self.outputs.is_empty() || !self.before_return.is_empty() {
+            self.change_end(body.to_mut());
+        }
+        let old = &*self.function;
         let base = &self.shader.ids[self.entry];
         let changes = Changes {
             expressions: &self.expressions,
@@ -277,7 +319,62 @@ impl<'a> Edit<'a> {
         let mut ids = self.shader.ids.clone();
         ids[self.entry] = self.ids(&function, &sources);
         self.module.entry_points[self.entry].function = function;
-        Shader::new(self.module, ids)
+        let shader = Shader::changed(self.module, ids, self.shader.authors);
+        match self.stage {
+            Stage::Fragment => interface::settle(shader),
+            Stage::Vertex => shader,
+        }
+    }
+
+    /// Puts in place what is done before the function returns, and what it returns then.
+    fn change_end(&mut self, body: &mut Block) {
+        let returned = match body.last() {
+            Some(Statement::Return { value }) => *value,
+            _ => None,
+        };
+        let outputs = std::mem::take(&mut self.outputs);
+        let returned = match outputs.is_empty() {
+            true => returned,
+            false => {
+                let function = &*self.function;
+                let (outputs, values): (Vec<_>, Vec<_>) = outputs.into_iter().unzip();
+                let result = function.result.as_ref();
+                let parts = interface::parts(&self.module, result);
+                let ty = interface::result(&mut self.module, result, &outputs);
+                let mut components = match (returned, parts) {
+                    (Some(returned), None) => vec![returned],
+                    (Some(returned), Some(count)) => match &self.expressions[returned] {
+                        Expression::Compose { components, .. } => components.clone(),
+                        _ => {
+                            let part = |index| Expression::AccessIndex {
+                                base: returned,
+                                index,
+                            };
+                            let path = format!("{}.returned", self.entry_name());
+                            (0..count)
+                                .map(|i| self.add(path.clone(), part(i)))
+                                .collect()
+                        }
+                    },
+                    (None, _) => Vec::new(),
+                };
+                components.extend(values);
+                self.function.to_mut().result = Some(naga::FunctionResult { ty, binding: None });
+                let path = format!("{}.return", self.entry_name());
+                Some(self.add(path, Expression::Compose { ty, components }))
+            }
+        };
+        let statements = std::mem::take(&mut self.before_return);
+        if let Some(last) = body.len().checked_sub(1) {
+            body.splice(last..last, statements);
+        }
+        if let Some(Statement::Return { value }) = body.iter_mut().last() {
+            *value = returned;
+        }
+    }
+
+    fn entry_name(&self) -> &str {
+        &self.shader.module.entry_points[self.entry].name
     }
 
     /// The ids of the new values. Old values keep theirs. What several values have become, a second copy of one, and what was made on the

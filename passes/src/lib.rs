@@ -13,6 +13,7 @@ pub mod facts;
 mod fingerprint;
 mod flow;
 mod fold;
+mod interface;
 mod live;
 pub mod normalize;
 pub mod op_removal;
@@ -22,8 +23,10 @@ pub mod rate;
 pub mod recipe;
 pub mod semantics;
 pub mod shader;
+mod slice;
 pub mod specialize;
 pub mod texture_removal;
+pub mod vertex_motion;
 
 pub use cost::Work;
 pub use edit::{Edit, New};
@@ -41,3 +44,6 @@ pub static PASSES: &[&dyn Pass] = &[
     &texture_removal::TextureRemoval,
     &op_removal::OpRemoval,
 ];
+
+/// Passes that are not searched yet: what they make cannot be emitted.
+pub static UNSEARCHED: &[&dyn Pass] = &[&vertex_motion::VertexMotion];

@@ -22,6 +22,7 @@
 //! (moving code between stages).
 
 use crate::flow::{Flow, Value};
+use crate::interface;
 use crate::operands;
 use crate::shader::{Shader, Stage};
 use naga::{
@@ -535,20 +536,11 @@ impl Analysis<'_> {
     /// What the vertex stage gives a location, when that is the same for the whole draw.
     fn handed(&self, location: u32) -> Option<Varies> {
         let rates = self.handed.as_ref()?;
-        let function = self.shader.function(Stage::Vertex)?;
-        let result = function.result.as_ref()?;
-        let is_it = |binding: &Option<Binding>| matches!(binding, Some(Binding::Location { location: at, .. }) if *at == location);
-        let TypeInner::Struct { members, .. } = &self.flow.module.types[result.ty].inner else {
-            return None;
+        let mut returned = interface::returned(self.shader).into_iter();
+        let is_it = |part: &interface::Returned| {
+            interface::location(part.binding.as_ref()) == Some(location)
         };
-        let member = members.iter().position(|m| is_it(&m.binding))?;
-        let Some(Statement::Return { value: Some(value) }) = function.body.last() else {
-            return None;
-        };
-        let Expression::Compose { components, .. } = &function.expressions[*value] else {
-            return None;
-        };
-        let varies = rates.varies(*components.get(member)?);
+        let varies = rates.varies(returned.find(is_it)?.value?);
         varies.is_uniform().then_some(*varies)
     }
 
@@ -609,7 +601,7 @@ impl Analysis<'_> {
 }
 
 /// The conditions of a loop's body that decide whether it goes on as written.
-fn ways_out(block: &Block, conditions: &mut Vec<Value>) {
+pub(crate) fn ways_out(block: &Block, conditions: &mut Vec<Value>) {
     for statement in block {
         let condition = match *statement {
             Statement::If { condition, .. } => Some(condition),

@@ -4,6 +4,7 @@
 //! The module holds the chosen entry points and no other function.
 
 use crate::flow::Findings;
+use crate::interface::Authors;
 use crate::operands::User;
 use crate::places::Places;
 use naga::proc::{ResolveContext, TypeResolution};
@@ -106,6 +107,8 @@ pub struct Shader {
     pub(crate) module: Module,
     /// For each entry point of `module`, the id of each expression, in arena order.
     pub(crate) ids: Vec<Vec<ValueId>>,
+    /// How much of what the stages hand over is the author's.
+    pub(crate) authors: Authors,
     /// For each entry point, what was found out about its function when first asked for.
     known: Arc<Vec<Known>>,
 }
@@ -119,9 +122,15 @@ struct Known {
 }
 
 impl Shader {
-    /// A shader from its parts: a valid module in normal form, and for each of its entry points the
+    /// An author's shader from its parts: a valid module in normal form, and for each of its entry points the
     /// id of each expression.
     pub(crate) fn new(module: Module, ids: Vec<Vec<ValueId>>) -> Self {
+        let authors = Authors::of(&module);
+        Self::changed(module, ids, authors)
+    }
+
+    /// A variant of an author's shader.
+    pub(crate) fn changed(module: Module, ids: Vec<Vec<ValueId>>, authors: Authors) -> Self {
         let lengths = module
             .entry_points
             .iter()
@@ -135,6 +144,7 @@ impl Shader {
             known: Arc::new(known.collect()),
             module,
             ids,
+            authors,
         }
     }
 
@@ -265,6 +275,13 @@ impl Shader {
         Validator::new(ValidationFlags::all(), Capabilities::all())
             .validate(&self.module)
             .map_err(Box::new)
+    }
+
+    /// The identity of one stage: a hash of what its entry point does.
+    pub fn fingerprint_of(&self, stage: Stage) -> Option<Fingerprint> {
+        let declared = crate::fingerprint::Declared::of(&self.module);
+        let function = self.function(stage)?;
+        Some(crate::fingerprint::of_function(&declared, function))
     }
 
     /// The identity of the shader: a hash of what its entry points do.

@@ -1,0 +1,376 @@
+//! What the vertex stage hands over to the fragment stage, and what passes have added to that.
+//!
+//! The author's inputs and outputs stay as they are. What was added stands behind them, in the order of the names, at the
+//! first locations that are free; what no fragment reads any more goes, with what computed it.
+
+use crate::edit::Edit;
+use crate::shader::{Shader, Stage};
+use naga::{
+    Binding, BuiltIn, Expression, Function, FunctionResult, Handle, Interpolation, Module, Span,
+    Statement, StructMember, Type, TypeInner,
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How many inputs a fragment stage may have, built-in ones that are not the position among them: WebGPU's default
+/// `maxInterStageShaderVariables`. Locations are below it.
+pub(crate) const MOST_VARIABLES: u32 = 16;
+
+/// What is put behind the name of the author's result, for the one that more is returned in.
+const SUFFIX: &str = "OfLevel";
+
+/// How much of the interface is the author's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Authors {
+    /// The first so many arguments of the fragment stage.
+    pub(crate) arguments: usize,
+    /// The first so many members of what the vertex stage returns; `None` when that is one value and no structure.
+    pub(crate) members: Option<usize>,
+}
+
+impl Authors {
+    /// All of it.
+    pub(crate) fn of(module: &Module) -> Self {
+        let mut all = Self::default();
+        for point in &module.entry_points {
+            match point.stage {
+                naga::ShaderStage::Fragment => all.arguments = point.function.arguments.len(),
+                naga::ShaderStage::Vertex => {
+                    let result = point.function.result.as_ref();
+                    all.members = parts(module, result).map(|count| count as usize);
+                }
+                _ => {}
+            }
+        }
+        all
+    }
+}
+
+/// A value that is handed over at a location.
+#[derive(Clone, Debug)]
+pub(crate) struct Output {
+    /// Its name for people.
+    pub(crate) name: String,
+    /// A float, or a vector of them.
+    pub(crate) ty: Handle<Type>,
+    /// Where, and how it is interpolated.
+    pub(crate) binding: Binding,
+}
+
+/// A binding at a location that is interpolated in a certain way, at the centre of the pixel.
+pub(crate) fn at(location: u32, interpolation: Interpolation) -> Binding {
+    Binding::Location {
+        location,
+        interpolation: Some(interpolation),
+        sampling: (interpolation != Interpolation::Flat).then_some(naga::Sampling::Center),
+        blend_src: None,
+        per_primitive: false,
+    }
+}
+
+/// How many members a result has; `None` when it is no structure.
+pub(crate) fn parts(module: &Module, result: Option<&FunctionResult>) -> Option<u32> {
+    match &module.types[result?.ty].inner {
+        TypeInner::Struct { members, .. } => Some(members.len() as u32),
+        _ => None,
+    }
+}
+
+/// The type of a result with more in it.
+pub(crate) fn result(
+    module: &mut Module,
+    result: Option<&FunctionResult>,
+    outputs: &[Output],
+) -> Handle<Type> {
+    let (mut members, name) = match result {
+        None => (Vec::new(), None),
+        Some(result) => match &module.types[result.ty] {
+            Type {
+                name,
+                inner: TypeInner::Struct { members, .. },
+            } => (members.clone(), name.clone()),
+            _ => {
+                let first = StructMember {
+                    name: Some("position".into()),
+                    ty: result.ty,
+                    binding: result.binding.clone(),
+                    offset: 0,
+                };
+                (vec![first], None)
+            }
+        },
+    };
+    members.extend(outputs.iter().map(|output| StructMember {
+        name: Some(output.name.clone()),
+        ty: output.ty,
+        binding: Some(output.binding.clone()),
+        offset: 0,
+    }));
+    structure(module, name.as_deref(), members)
+}
+
+/// A structure of these members, named after the author's.
+fn structure(
+    module: &mut Module,
+    name: Option<&str>,
+    mut members: Vec<StructMember>,
+) -> Handle<Type> {
+    let name = name.unwrap_or("Vertex");
+    let name = match name.ends_with(SUFFIX) {
+        true => name.to_owned(),
+        false => format!("{name}{SUFFIX}"),
+    };
+    let (mut end, mut widest) = (0, 4);
+    for member in &mut members {
+        let (size, alignment) = layout(&module.types[member.ty].inner);
+        member.offset = u32::next_multiple_of(end, alignment);
+        end = member.offset + size;
+        widest = widest.max(alignment);
+    }
+    let inner = TypeInner::Struct {
+        members,
+        span: end.next_multiple_of(widest),
+    };
+    let ty = Type {
+        name: Some(name),
+        inner,
+    };
+    module.types.insert(ty, Span::UNDEFINED)
+}
+
+/// Size and alignment of what may be handed over, in bytes.
+fn layout(inner: &TypeInner) -> (u32, u32) {
+    match *inner {
+        TypeInner::Vector { size, scalar } => {
+            let count = size as u32;
+            let width = u32::from(scalar.width);
+            (width * count, width * if count == 3 { 4 } else { count })
+        }
+        // An array of clip distances.
+        TypeInner::Array {
+            size: naga::ArraySize::Constant(count),
+            stride,
+            ..
+        } => (stride * count.get(), 4),
+        _ => (4, 4),
+    }
+}
+
+/// What a vertex stage returns, member by member: the binding, and the value where it is known apart from the others.
+pub(crate) struct Returned {
+    pub(crate) binding: Option<Binding>,
+    pub(crate) ty: Handle<Type>,
+    pub(crate) value: Option<Handle<Expression>>,
+}
+
+/// What the vertex stage of a shader returns; nothing without one.
+pub(crate) fn returned(shader: &Shader) -> Vec<Returned> {
+    let Some(function) = shader.function(Stage::Vertex) else {
+        return Vec::new();
+    };
+    let Some(result) = &function.result else {
+        return Vec::new();
+    };
+    let value = match function.body.last() {
+        Some(Statement::Return { value }) => *value,
+        _ => None,
+    };
+    match &shader.module().types[result.ty].inner {
+        TypeInner::Struct { members, .. } => {
+            let components = match value.map(|value| &function.expressions[value]) {
+                Some(Expression::Compose { components, .. }) => components.as_slice(),
+                _ => &[],
+            };
+            let members = members.iter().enumerate();
+            let part = |(i, member): (usize, &StructMember)| Returned {
+                binding: member.binding.clone(),
+                ty: member.ty,
+                value: components.get(i).copied(),
+            };
+            members.map(part).collect()
+        }
+        _ => vec![Returned {
+            binding: result.binding.clone(),
+            ty: result.ty,
+            value,
+        }],
+    }
+}
+
+/// The location of a binding.
+pub(crate) fn location(binding: Option<&Binding>) -> Option<u32> {
+    match binding {
+        Some(Binding::Location { location, .. }) => Some(*location),
+        _ => None,
+    }
+}
+
+/// The bindings of a function's arguments, those of structures' members among them.
+fn bindings<'a>(module: &'a Module, function: &'a Function) -> Vec<&'a Binding> {
+    let mut found = Vec::new();
+    for argument in &function.arguments {
+        match (&argument.binding, &module.types[argument.ty].inner) {
+            (Some(binding), _) => found.push(binding),
+            (None, TypeInner::Struct { members, .. }) => {
+                found.extend(members.iter().filter_map(|member| member.binding.as_ref()));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// The first location that nothing is handed over at; `None` when there is no room for another variable.
+pub(crate) fn free_location(shader: &Shader) -> Option<u32> {
+    let function = shader.function(Stage::Fragment)?;
+    let inputs = bindings(shader.module(), function);
+    let counts =
+        |binding: &&&Binding| !matches!(binding, Binding::BuiltIn(BuiltIn::Position { .. }));
+    let taken = locations(shader);
+    let built_in = inputs.iter().filter(counts).count()
+        - inputs
+            .iter()
+            .filter_map(|input| location(Some(input)))
+            .count();
+    let free = (0..MOST_VARIABLES).find(|location| !taken.contains(location))?;
+    (taken.len() + built_in < MOST_VARIABLES as usize).then_some(free)
+}
+
+/// The locations of either stage's side of the interface.
+fn locations(shader: &Shader) -> BTreeSet<u32> {
+    let mut taken: BTreeSet<u32> = BTreeSet::new();
+    if let Some(function) = shader.function(Stage::Fragment) {
+        let inputs = bindings(shader.module(), function);
+        taken.extend(inputs.into_iter().filter_map(|input| location(Some(input))));
+    }
+    let outputs = returned(shader);
+    taken.extend(outputs.iter().filter_map(|o| location(o.binding.as_ref())));
+    taken
+}
+
+/// Brings what was added to the interface in order: without what no fragment reads, by name, at the first free locations.
+pub(crate) fn settle(shader: Shader) -> Shader {
+    let Authors { arguments, members } = shader.authors;
+    let (Some(fragment), Some(vertex)) =
+        (shader.index(Stage::Fragment), shader.index(Stage::Vertex))
+    else {
+        return shader;
+    };
+    let function = &shader.module.entry_points[fragment].function;
+    if function.arguments.len() <= arguments {
+        return shader;
+    }
+    let mut read = vec![false; function.arguments.len()];
+    for (_, expression) in function.expressions.iter() {
+        if let Expression::FunctionArgument(at) = expression {
+            read[*at as usize] = true;
+        }
+    }
+    let mut order: Vec<usize> = (arguments..read.len()).filter(|at| read[*at]).collect();
+    order.sort_by(|a, b| {
+        function.arguments[*a]
+            .name
+            .cmp(&function.arguments[*b].name)
+    });
+    let added = |at: usize| location(function.arguments[at].binding.as_ref());
+    let of_authors: BTreeSet<u32> = {
+        let own: BTreeSet<u32> = (arguments..read.len()).filter_map(added).collect();
+        locations(&shader).difference(&own).copied().collect()
+    };
+    let free = (0..MOST_VARIABLES).filter(|location| !of_authors.contains(location));
+    // From an old location to the new one, and from an old argument to the new one.
+    let mut moved: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut renumbered: BTreeMap<u32, u32> = BTreeMap::new();
+    for ((new, old), location) in order.iter().enumerate().zip(free) {
+        moved.extend(added(*old).map(|old| (old, location)));
+        renumbered.insert(*old as u32, (arguments + new) as u32);
+    }
+    let settled = moved.len() == read.len() - arguments
+        && moved.iter().all(|(old, new)| old == new)
+        && renumbered.iter().all(|(old, new)| old == new);
+    if settled {
+        return shader;
+    }
+
+    let Shader {
+        mut module,
+        ids,
+        authors,
+        ..
+    } = shader;
+    let at_new = |binding: &Option<Binding>| -> Option<Binding> {
+        let mut binding = binding.clone()?;
+        if let Binding::Location { location, .. } = &mut binding {
+            *location = *moved.get(location)?;
+        }
+        Some(binding)
+    };
+    let function = &mut module.entry_points[fragment].function;
+    let of_levels = function.arguments.split_off(arguments);
+    for old in &order {
+        let mut argument = of_levels[old - arguments].clone();
+        argument.binding = at_new(&argument.binding);
+        function.arguments.push(argument);
+    }
+    for (_, expression) in function.expressions.iter_mut() {
+        if let Expression::FunctionArgument(at) = expression {
+            *at = renumbered.get(at).copied().unwrap_or(*at);
+        }
+    }
+
+    let mut function = std::mem::take(&mut module.entry_points[vertex].function);
+    let returned = match function.body.last() {
+        Some(Statement::Return { value: Some(value) }) => *value,
+        _ => unreachable!("what was added is returned"),
+    };
+    let (Some(result), Expression::Compose { components, .. }) =
+        (&mut function.result, &mut function.expressions[returned])
+    else {
+        unreachable!("what was added is a part of what is returned");
+    };
+    let Type {
+        name,
+        inner: TypeInner::Struct {
+            members: mut all, ..
+        },
+    } = module.types[result.ty].clone()
+    else {
+        unreachable!("what was added is a member of what is returned");
+    };
+    let mut behind: Vec<(StructMember, Handle<Expression>)> = all
+        .split_off(members.unwrap_or(1))
+        .into_iter()
+        .zip(components.split_off(members.unwrap_or(1)))
+        .filter_map(|(mut member, value)| {
+            member.binding = at_new(&member.binding);
+            member.binding.is_some().then_some((member, value))
+        })
+        .collect();
+    behind.sort_by_key(|(member, _)| location(member.binding.as_ref()));
+    let dropped = behind.len() < of_levels.len();
+    for (member, value) in behind {
+        all.push(member);
+        components.push(value);
+    }
+    if let (None, [only]) = (members, &all[..]) {
+        *result = FunctionResult {
+            ty: only.ty,
+            binding: only.binding.clone(),
+        };
+        let value = components[0];
+        if let Some(Statement::Return { value: returned }) = function.body.iter_mut().last() {
+            *returned = Some(value);
+        }
+    } else {
+        result.ty = structure(&mut module, name.as_deref(), all);
+        if let Expression::Compose { ty, .. } = &mut function.expressions[returned] {
+            *ty = result.ty;
+        }
+    }
+    module.entry_points[vertex].function = function;
+    let shader = Shader::changed(module, ids, authors);
+    match dropped {
+        // What computed it goes.
+        true => Edit::new(&shader, Stage::Vertex).finish(),
+        false => shader,
+    }
+}
