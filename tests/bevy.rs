@@ -285,12 +285,12 @@ fn vulkan_draws_it_and_its_normal_form_as_the_evaluator_does() {
         let [written, normal] = pipelines
             .each_ref()
             .map(|pipeline| drawn(&mut renderer, pipeline, &scene, &frame));
-        filtered.add(scene.output, &written, &truth);
-        forms.add(scene.output, &normal, &written);
+        filtered.add(&scene, &written, &truth);
+        forms.add(&scene, &normal, &written);
         let even = even(&frame);
         let truth = evaluated(&by_evaluator, &scene, &even);
         let written = drawn(&mut renderer, &pipelines[0], &scene, &even);
-        rounded.add(scene.output, &written, &truth);
+        rounded.add(&scene, &written, &truth);
     }
     let judged = [
         filtered.judge("vulkan Bevy", FILTERED),

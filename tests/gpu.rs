@@ -10,17 +10,21 @@ mod pictures;
 
 use lodc::compile::{self, Request, normal_form};
 use lodc::emit::{Form, write_atomically};
-use lodc::eval::draw::Blend;
+use lodc::eval::draw::{Blend, DrawState};
 use lodc::eval::image::Picture;
 use lodc::eval::raster::Frame;
 use lodc::front::{Modules, Source, Stages as Chosen};
 use lodc::gpu::worker::{Failure, Subject, Variant, Wanted, Worker};
 use lodc::gpu::{Gpu, Renderer, Stages};
-use lodc::scene::{Output, Scene};
-use lodc::search::error::{displayed, encoded};
+use lodc::scene::Scene;
+use lodc::scene::mesh::{Draw, Mesh};
+use lodc::search::error::{displayed, encoded, through};
 use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
-use pictures::{Apart, FILTERED, ROUNDED, STEP, drawn, evaluated, even, open, pipeline, programs};
+use pictures::{
+    Apart, FILTERED, ROUNDED, STEP, drawn, evaluated, even, open, pipeline, programs, shown,
+};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Where a test puts its materials.
@@ -32,18 +36,6 @@ fn read(path: &Path) -> (Source, Scene) {
     let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
     (source, scene)
-}
-
-/// Whether a scene blends, which the evaluator alone draws; that is said.
-fn blends(path: &Path, scene: &Scene) -> bool {
-    let blends = scene
-        .states
-        .iter()
-        .any(|state| state.blend != Blend::Opaque);
-    if blends {
-        println!("{}: blended, by the evaluator alone", path.display());
-    }
-    blends
 }
 
 /// The frames that are looked at: near and far, off the pixels' centres, and with fine pixels.
@@ -70,9 +62,6 @@ fn materials_are_drawn_alike(interface: &str) {
     let mut wrong = Vec::new();
     for path in fixtures::small_materials(&scratch(interface), 64, &[]) {
         let (source, scene) = read(&path);
-        if blends(&path, &scene) {
-            continue;
-        }
         let name = format!(
             "{interface} {}",
             path.file_stem().unwrap_or_default().display()
@@ -89,13 +78,13 @@ fn materials_are_drawn_alike(interface: &str) {
             let [written, normal] = pipelines
                 .each_ref()
                 .map(|pipeline| drawn(&mut renderer, pipeline, &scene, &frame));
-            filtered.add(scene.output, &written, &truth);
-            forms.add(scene.output, &normal, &written);
+            filtered.add(&scene, &written, &truth);
+            forms.add(&scene, &normal, &written);
             if frame.grid == 1 {
                 let even = even(&frame);
                 let truth = evaluated(&by_evaluator, &scene, &even);
                 let drawn = drawn(&mut renderer, &pipelines[0], &scene, &even);
-                rounded.add(scene.output, &drawn, &truth);
+                rounded.add(&scene, &drawn, &truth);
             }
         }
         wrong.extend(filtered.judge(&name, FILTERED));
@@ -113,6 +102,87 @@ fn vulkan_draws_what_the_evaluator_draws() {
 #[test]
 fn opengl_draws_what_the_evaluator_draws() {
     materials_are_drawn_alike("opengl");
+}
+
+/// Spheres that cut each other, drawn in every way: two of them are the same, one hides a part of the others, and of one
+/// only the front is seen.
+fn spheres(sphere: &Mesh) -> (Mesh, Vec<DrawState>) {
+    let draws = [
+        ([0.0, 0.0], 0.5, Blend::Opaque),
+        ([0.4, 0.0], 0.8, Blend::Alpha),
+        ([-0.4, 0.2], 0.9, Blend::Additive),
+        ([0.0, 0.5], 0.7, Blend::Premultiplied),
+        ([0.4, 0.0], 0.8, Blend::Alpha),
+    ];
+    let mut mesh = Mesh::default();
+    let mut states = Vec::new();
+    for ([x, y], size, blend) in draws {
+        let first = (mesh.positions.len(), mesh.indices.len() / 3);
+        let moved = |[a, b, c]: &[f32; 3]| [size * a + x, size * b + y, size * c];
+        mesh.positions.extend(sphere.positions.iter().map(moved));
+        mesh.normals.extend(&sphere.normals);
+        mesh.uvs.extend(&sphere.uvs);
+        let own = sphere.indices.iter().map(|i| i + first.0 as u32);
+        mesh.indices.extend(own);
+        mesh.draws.push(Draw {
+            vertices: first.0..mesh.positions.len(),
+            triangles: first.1..mesh.indices.len() / 3,
+        });
+        states.push(DrawState {
+            blend,
+            front_only: blend == Blend::Premultiplied,
+        });
+    }
+    (mesh, states)
+}
+
+#[test]
+fn blended_draws_are_composed_in_the_order_of_the_evaluator() {
+    // Colours and alpha beyond 0..1, and none in some places.
+    let shade = "
+        fn shade(normal: vec3f, uv: vec2f, front: bool) -> vec4f {
+            if fract(uv.x * 12.0) < 0.2 { discard; }
+            let alpha = 1.3 * fract(uv.y * 5.0) - 0.1;
+            return vec4f(select(normal.zxy, normal, front) * 0.9 + 0.3, alpha);
+        }";
+    let plain = "
+        @fragment fn fs(@location(0) normal: vec3f, @location(1) uv: vec2f, @builtin(front_facing) front: bool)
+            -> @location(0) vec4f { return shade(normal, uv, front); }";
+    // Depths that many fragments have, 0 among them, and some that are none.
+    let deep = "
+        struct Out { @location(0) colour: vec4f, @builtin(frag_depth) depth: f32 }
+        @fragment fn fs(@location(0) normal: vec3f, @location(1) uv: vec2f, @builtin(front_facing) front: bool) -> Out {
+            return Out(shade(normal, uv, front), floor(uv.y * 7.0) / 5.0 - 0.2);
+        }";
+    let mut wrong = Vec::new();
+    for (name, entry) in [("plain", plain), ("deep", deep)] {
+        for output in ["display", "encoded", "linear"] {
+            let shader = format!("{shade}\n{entry}");
+            let text = format!("object = \"sphere\"\noutput = \"{output}\"");
+            let subject = written(&format!("blended-{name}-{output}"), &shader, &text);
+            let (source, mut scene) = read(&subject.shader);
+            scene.resolution = [64, 64];
+            let (mesh, states) = spheres(&scene.frames(4.0).swap_remove(0).mesh);
+            scene.states = states.into();
+            let frame = Frame {
+                mesh: Arc::new(mesh),
+                grid: 2,
+                ..scene.frames(4.0).swap_remove(0)
+            };
+            let stages = Stages::of_source(&source, &scene).expect("it has both stages");
+            let truth = evaluated(&programs(stages), &scene, &frame);
+            for gpu in ["vulkan", "opengl"].into_iter().filter_map(open) {
+                let mut renderer = Renderer::new(&gpu);
+                let pipeline = pipeline(&renderer, stages, &scene);
+                let found = drawn(&mut renderer, &pipeline, &scene, &frame);
+                let mut apart = Apart::default();
+                apart.add(&scene, &found, &truth);
+                let what = format!("{} blended, {name}, {output}", gpu.label().backend);
+                wrong.extend(apart.judge(&what, ROUNDED));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "too far apart:\n{}", wrong.join("\n"));
 }
 
 /// A text of WGSL with `autoLOD` set, so that the evaluator can run it.
@@ -138,18 +208,17 @@ struct Error {
 }
 
 impl Error {
-    fn add(&mut self, output: Output, reference: &Picture, picture: &Picture) {
-        for (i, covered) in reference.covered.iter().enumerate() {
+    fn add(&mut self, scene: &Scene, reference: &[Picture; 2], picture: &Picture) {
+        let [black, white] = reference;
+        for (i, covered) in black.covered.iter().enumerate() {
             self.coverage += f64::from(*covered);
-            let [r, g, b, _] = reference.pixels[i];
-            let of = |light: [f32; 3]| encoded(light.map(|c| c.clamp(0.0, 1.0)));
-            // Over black and over white.
-            for behind in [0.0, 1.0 - covered] {
-                let truth = of([r + behind, g + behind, b + behind]);
-                let shown = match picture.covered[i] > 0.0 {
-                    true => encoded(displayed(output, picture.pixels[i])),
-                    false => [f32::from(behind > 0.0); 3],
-                };
+            let shown = match picture.covered[i] > 0.0 {
+                true => shown(scene, picture.pixels[i]),
+                false => [[0.0; 3], [1.0; 3]],
+            };
+            for (truth, shown) in [black, white].into_iter().zip(shown) {
+                let [r, g, b, _] = truth.pixels[i];
+                let truth = encoded([r, g, b].map(|c| c.clamp(0.0, 1.0)));
                 let squares = truth
                     .iter()
                     .zip(shown)
@@ -164,15 +233,23 @@ impl Error {
     }
 }
 
-/// What a display shows of a picture in fine pixels, in linear light, filtered into pixels.
-fn reference(output: Output, mut fine: Picture) -> Picture {
-    for (colour, covered) in fine.pixels.iter_mut().zip(&fine.covered) {
+/// What a display shows of a picture in fine pixels, in linear light, filtered into pixels: over black and over white.
+fn reference(scene: &Scene, fine: Picture) -> [Picture; 2] {
+    let (mut black, mut white) = (fine.clone(), fine.clone());
+    for (i, covered) in fine.covered.iter().enumerate() {
+        white.pixels[i] = [1.0; 4];
         if *covered > 0.0 {
-            let [r, g, b] = displayed(output, *colour);
-            *colour = [r, g, b, 1.0];
+            let light = displayed(scene.output, fine.pixels[i]);
+            let more = match scene.blends() {
+                true => through(scene.output, fine.pixels[i]),
+                false => [0.0; 3],
+            };
+            let [r, g, b] = light;
+            black.pixels[i] = [r, g, b, 1.0];
+            white.pixels[i] = [r + more[0], g + more[1], b + more[2], 1.0];
         }
     }
-    fine.box_filtered(4)
+    [black, white].map(|picture| picture.box_filtered(4))
 }
 
 #[test]
@@ -184,9 +261,6 @@ fn levels_are_drawn_with_the_errors_that_the_evaluator_finds() {
             break;
         }
         let (source, scene) = read(&path);
-        if blends(&path, &scene) {
-            continue;
-        }
         let emitted = Emitted::new(&path);
         for gpu in &adapters {
             let interface = gpu.label().backend;
@@ -257,7 +331,7 @@ impl Emitted {
         let unset = pipeline(&renderer, stages(&self.whole), scene);
         let unset = drawn(&mut renderer, &unset, scene, &near);
         let mut apart = Apart::default();
-        apart.add(scene.output, &unset, &truth);
+        apart.add(scene, &unset, &truth);
         assert!(apart.most(0.0) <= STEP, "{name}: {}", apart.most(0.0));
 
         for (auto_lod, distance) in &self.levels {
@@ -273,11 +347,7 @@ impl Emitted {
             // Nearer than a host would draw it, there is more to see.
             let mut apart = Apart::default();
             let by_gpu = drawn(&mut renderer, &of_gpu, scene, &near);
-            apart.add(
-                scene.output,
-                &by_gpu,
-                &evaluated(&of_evaluator, scene, &near),
-            );
+            apart.add(scene, &by_gpu, &evaluated(&of_evaluator, scene, &near));
             wrong.extend(apart.judge(&what, FILTERED));
             let (mut by_gpu, mut by_evaluator) = (Error::default(), Error::default());
             for frame in scene.frames(*distance) {
@@ -292,10 +362,10 @@ impl Emitted {
                 };
                 let truth = evaluated(&original_programs, scene, &fine);
                 let level = evaluated(&of_evaluator, scene, &frame);
-                by_evaluator.add(scene.output, &reference(scene.output, truth), &level);
+                by_evaluator.add(scene, &reference(scene, truth), &level);
                 let truth = drawn(&mut renderer, &original, scene, &fine);
                 let level = drawn(&mut renderer, &of_gpu, scene, &frame);
-                by_gpu.add(scene.output, &reference(scene.output, truth), &level);
+                by_gpu.add(scene, &reference(scene, truth), &level);
             }
             let (a, b) = (by_evaluator.rmse(), by_gpu.rmse());
             println!("{what}: RMSE {a:.5} by the evaluator, {b:.5} by the GPU");

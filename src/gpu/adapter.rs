@@ -195,6 +195,11 @@ impl Gpu {
         info.driver == "llvmpipe" && major.is_some_and(|major| major < 23)
     }
 
+    /// Whether a fragment knows its triangle.
+    pub(super) fn tells_triangles(&self) -> bool {
+        self.device.features().contains(Features::PRIMITIVE_INDEX)
+    }
+
     /// What the adapter is called.
     pub fn label(&self) -> &AdapterLabel {
         &self.label

@@ -3,7 +3,8 @@
 //! The shader's entry point becomes an ordinary function, unchanged, and one that calls it takes its place:
 //! - The vertex one moves clip positions, so that pixels are sampled off their centres.
 //! - The fragment one says positions in the frame's pixels, whatever the grid and the offset, and returns each colour
-//!   as four components, what the shader leaves out 0 and alpha 1.
+//!   as four components, what the shader leaves out 0 and alpha 1. Where layers are drawn one by one, it draws those
+//!   fragments alone that are behind the layer before.
 //!
 //! What they need of a frame is in a uniform buffer of their own ([`Place`]), so that one pipeline draws all frames.
 
@@ -11,7 +12,7 @@ use naga::{
     AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, EntryPoint, Expression,
     Function, FunctionArgument, FunctionResult, GlobalVariable, Handle, ImageClass, ImageDimension,
     Interpolation, Literal, Module, ResourceBinding, Scalar, ScalarKind, Span, Statement,
-    StructMember, SwizzleComponent, Type, TypeInner, VectorSize,
+    StructMember, SwizzleComponent, Type, TypeInner, UnaryOperator, VectorSize,
 };
 use std::num::NonZeroU32;
 
@@ -27,6 +28,9 @@ pub(super) struct Place {
     scale: f32,
     /// Where in a pixel it is sampled, from the centre.
     offset: [f32; 2],
+    /// Where layers are drawn: the first triangle of the draw among those of the mesh, and how it is blended.
+    first: u32,
+    blend: u32,
 }
 
 impl Place {
@@ -39,6 +43,18 @@ impl Place {
             ],
             scale: 1.0 / grid as f32,
             offset,
+            first: 0,
+            blend: 0,
+        }
+    }
+
+    /// The same of a draw whose layers are drawn: its first triangle among those of the mesh, and how it is blended,
+    /// 0..=3. Both go through a float, which holds them exactly.
+    pub(super) fn of_draw(self, first: u32, blend: u32) -> Self {
+        Self {
+            first,
+            blend,
+            ..self
         }
     }
 
@@ -49,11 +65,11 @@ impl Place {
             x,
             y,
             0.0,
-            0.0,
+            self.blend as f32,
             self.scale,
             self.offset[0],
             self.offset[1],
-            0.0,
+            self.first as f32,
         ];
         words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
@@ -68,13 +84,33 @@ pub(super) struct Colour {
     pub(super) kind: Option<ScalarKind>,
 }
 
-/// What a fragment entry point draws to; behind the colours, 1 wherever anything is drawn.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What a fragment entry point draws to; behind the colours, 1 wherever anything is drawn, or the fragment's order where
+/// layers are drawn.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Targets {
     /// The colours, each drawn to the target of its place in this list.
     pub(super) colours: Vec<Colour>,
     /// A texture of coverage, at its group and binding: where it is 0, nothing is drawn.
     pub(super) only_where: Option<(u32, u32)>,
+    /// Whether the depth is written as the entry point sees it, 0..1, so that another one can compare its own with it to
+    /// the bit.
+    pub(super) writes_depth: bool,
+    /// Where only what is behind a layer is drawn.
+    pub(super) layer: Option<Behind>,
+}
+
+/// Textures by which one layer of a picture is drawn: what is in front of all that is opaque and behind the layer before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Behind {
+    /// The depth of what is opaque, at its group and binding.
+    pub(super) opaque: (u32, u32),
+    /// The depth of the layer before.
+    pub(super) depth: (u32, u32),
+    /// The order of its fragments: of equally deep ones, the one of the last triangle is in front. It is four times a
+    /// triangle's place among all, and how it is blended.
+    pub(super) order: (u32, u32),
+    /// Whether triangles can be told apart; if not, draws are, and of equally deep fragments of one only one is seen.
+    pub(super) tells_triangles: bool,
 }
 
 /// The module with one vertex entry point, [`NAME`], around the one at `entry`.
@@ -122,7 +158,18 @@ pub(super) fn fragment(
     if let Some(at) = targets.only_where {
         around.only_where(at);
     }
-    let returned = around.returned(result, returned);
+    let mut returned = around.returned(result, returned);
+    let mut order = None;
+    if targets.writes_depth {
+        let is_depth =
+            |(binding, ..): &(Binding, _, _)| *binding == Binding::BuiltIn(BuiltIn::FragDepth);
+        let own = returned.iter().position(is_depth);
+        let own = own.map(|at| returned.remove(at).2);
+        let depth = around.depth(own);
+        order = targets.layer.map(|layer| around.behind(layer, depth));
+        let ty = around.ty(TypeInner::Scalar(Scalar::F32));
+        returned.push((Binding::BuiltIn(BuiltIn::FragDepth), ty, depth));
+    }
     let mut members = Vec::new();
     let mut components = Vec::new();
     let mut offset = 0;
@@ -157,13 +204,13 @@ pub(super) fn fragment(
         let inner = four(scalar(colour.kind.unwrap_or(ScalarKind::Uint)));
         add(&mut around, location(at), inner, value);
     }
-    let one = around.emit(Expression::Literal(Literal::U32(1)));
+    let drawn = order.unwrap_or_else(|| around.literal(Literal::U32(1)));
     let at = targets.colours.len() as u32;
     add(
         &mut around,
         location(at),
         TypeInner::Scalar(Scalar::U32),
-        one,
+        drawn,
     );
     for (binding, ty, value) in returned {
         if let Binding::BuiltIn(_) = binding {
@@ -220,8 +267,9 @@ struct Around {
     inner_result: Option<FunctionResult>,
     place: Handle<GlobalVariable>,
     function: Function,
-    /// The position in the fragment's arguments, as it came.
+    /// The position and the triangle among the fragment's arguments, as they came.
     position: Option<Handle<Expression>>,
+    triangle: Option<Handle<Expression>>,
 }
 
 impl Around {
@@ -252,6 +300,7 @@ impl Around {
             place,
             function,
             position: None,
+            triangle: None,
         }
     }
 
@@ -277,6 +326,10 @@ impl Around {
             self.push(Statement::Emit(range));
         }
         value
+    }
+
+    fn literal(&mut self, literal: Literal) -> Handle<Expression> {
+        self.emit(Expression::Literal(literal))
     }
 
     fn push(&mut self, statement: Statement) {
@@ -313,31 +366,62 @@ impl Around {
         for (index, FunctionArgument { ty, binding, .. }) in (0..).zip(arguments) {
             let value = self.emit(Expression::FunctionArgument(index));
             let value = match self.module.types[ty].inner.clone() {
-                TypeInner::Struct { members, .. }
-                    if members.iter().any(|m| is_position(m.binding.as_ref())) =>
-                {
+                TypeInner::Struct { members, .. } => {
                     let mut components = Vec::new();
                     for (index, member) in (0..).zip(&members) {
                         let value = self.at(value, index);
-                        components.push(match is_position(member.binding.as_ref()) {
-                            true => {
-                                self.position = Some(value);
-                                of_position(self, value)
-                            }
-                            false => value,
-                        });
+                        components.push(self.argument(
+                            member.binding.as_ref(),
+                            value,
+                            &of_position,
+                        ));
                     }
                     self.emit(Expression::Compose { ty, components })
                 }
-                _ if is_position(binding.as_ref()) => {
-                    self.position = Some(value);
-                    of_position(self, value)
-                }
-                _ => value,
+                _ => self.argument(binding.as_ref(), value, &of_position),
             };
             values.push(value);
         }
         values
+    }
+
+    /// One of them.
+    fn argument(
+        &mut self,
+        binding: Option<&Binding>,
+        value: Handle<Expression>,
+        of_position: impl Fn(&mut Self, Handle<Expression>) -> Handle<Expression>,
+    ) -> Handle<Expression> {
+        if binding == Some(&Binding::BuiltIn(BuiltIn::PrimitiveIndex)) {
+            self.triangle = Some(value);
+        }
+        if !is_position(binding) {
+            return value;
+        }
+        self.position = Some(value);
+        of_position(self, value)
+    }
+
+    /// A built-in that the shader does not take, as another argument.
+    fn taken(&mut self, name: &str, built_in: BuiltIn, inner: TypeInner) -> Handle<Expression> {
+        let ty = self.ty(inner);
+        let index = self.function.arguments.len() as u32;
+        self.function.arguments.push(FunctionArgument {
+            name: Some(name.to_owned()),
+            ty,
+            binding: Some(Binding::BuiltIn(built_in)),
+        });
+        self.emit(Expression::FunctionArgument(index))
+    }
+
+    /// The fragment's position in fine pixels.
+    fn fine_position(&mut self) -> Handle<Expression> {
+        let position = self.position.unwrap_or_else(|| {
+            let built_in = BuiltIn::Position { invariant: false };
+            self.taken("fine_position", built_in, four(Scalar::F32))
+        });
+        self.position = Some(position);
+        position
     }
 
     /// Calls the shader's function.
@@ -386,18 +470,95 @@ impl Around {
     }
 
     /// Draws nothing where a texture of coverage is 0.
-    fn only_where(&mut self, (group, binding): (u32, u32)) {
+    fn only_where(&mut self, at: (u32, u32)) {
+        let drawn = self.loaded("drawn_before", at, ScalarKind::Uint);
+        let zero = self.literal(Literal::U32(0));
+        let hidden = self.binary(BinaryOperator::Equal, drawn, zero);
+        self.kill_if(hidden);
+    }
+
+    /// The depth of the fragment, 0..1, a NaN 0: what the shader returned, or else that of its triangle.
+    fn depth(&mut self, own: Option<Handle<Expression>>) -> Handle<Expression> {
+        let mut depth = own.unwrap_or_else(|| {
+            let position = self.fine_position();
+            self.at(position, 2)
+        });
+        let [zero, one] = [0.0, 1.0].map(|number| self.literal(Literal::F32(number)));
+        // Said so that a NaN is none of them.
+        for (limit, beyond) in [(zero, BinaryOperator::Greater), (one, BinaryOperator::Less)] {
+            let inside = self.binary(beyond, depth, limit);
+            depth = self.emit(Expression::Select {
+                condition: inside,
+                accept: depth,
+                reject: limit,
+            });
+        }
+        depth
+    }
+
+    /// Draws nothing but what is in front of all that is opaque and behind the layer before; gives the fragment's order.
+    fn behind(&mut self, layer: Behind, depth: Handle<Expression>) -> Handle<Expression> {
+        let opaque = self.loaded("opaque_depth", layer.opaque, ScalarKind::Float);
+        let before = self.loaded("depth_before", layer.depth, ScalarKind::Float);
+        let order_before = self.loaded("order_before", layer.order, ScalarKind::Uint);
+        let [mut order, blend] = [1, 0].map(|index| {
+            let place = self.place(index);
+            let number = self.at(place, 3);
+            self.emit(Expression::As {
+                expr: number,
+                kind: ScalarKind::Uint,
+                convert: Some(4),
+            })
+        });
+        if layer.tells_triangles {
+            let triangle = self.triangle.unwrap_or_else(|| {
+                let inner = TypeInner::Scalar(Scalar::U32);
+                self.taken("triangle", BuiltIn::PrimitiveIndex, inner)
+            });
+            order = self.binary(BinaryOperator::Add, order, triangle);
+        }
+        let four = self.literal(Literal::U32(4));
+        let order = self.binary(BinaryOperator::Multiply, order, four);
+        let order = self.binary(BinaryOperator::Add, order, blend);
+
+        let in_front = self.binary(BinaryOperator::Less, depth, opaque);
+        let deeper = self.binary(BinaryOperator::Greater, depth, before);
+        let as_deep = self.binary(BinaryOperator::Equal, depth, before);
+        let earlier = self.binary(BinaryOperator::Less, order, order_before);
+        let next = self.binary(BinaryOperator::LogicalAnd, as_deep, earlier);
+        let next = self.binary(BinaryOperator::LogicalOr, deeper, next);
+        let seen = self.binary(BinaryOperator::LogicalAnd, in_front, next);
+        let hidden = self.emit(Expression::Unary {
+            op: UnaryOperator::LogicalNot,
+            expr: seen,
+        });
+        self.kill_if(hidden);
+        order
+    }
+
+    fn kill_if(&mut self, condition: Handle<Expression>) {
+        self.push(Statement::If {
+            condition,
+            accept: Block::from_vec(vec![Statement::Kill]),
+            reject: Block::new(),
+        });
+    }
+
+    /// The first component of the fragment's texel of an image that was drawn before.
+    fn loaded(
+        &mut self,
+        name: &str,
+        (group, binding): (u32, u32),
+        kind: ScalarKind,
+    ) -> Handle<Expression> {
         let image = self.ty(TypeInner::Image {
             dim: ImageDimension::D2,
             arrayed: false,
-            class: ImageClass::Sampled {
-                kind: ScalarKind::Uint,
-                multi: false,
-            },
+            class: ImageClass::Sampled { kind, multi: false },
         });
         let image = self.module.global_variables.append(
             GlobalVariable {
-                name: Some("drawn_before".to_owned()),
+                name: Some(name.to_owned()),
                 space: AddressSpace::Handle,
                 binding: Some(ResourceBinding { group, binding }),
                 ty: image,
@@ -406,19 +567,7 @@ impl Around {
             },
             Span::UNDEFINED,
         );
-        let position = match self.position {
-            Some(position) => position,
-            None => {
-                let ty = self.ty(four(Scalar::F32));
-                let index = self.function.arguments.len() as u32;
-                self.function.arguments.push(FunctionArgument {
-                    name: Some("fine_position".to_owned()),
-                    ty,
-                    binding: Some(Binding::BuiltIn(BuiltIn::Position { invariant: false })),
-                });
-                self.emit(Expression::FunctionArgument(index))
-            }
-        };
+        let position = self.fine_position();
         let at = self.emit(Expression::Swizzle {
             size: VectorSize::Bi,
             vector: position,
@@ -430,7 +579,7 @@ impl Around {
             convert: Some(4),
         });
         let image = self.emit(Expression::GlobalVariable(image));
-        let level = self.emit(Expression::Literal(Literal::I32(0)));
+        let level = self.literal(Literal::I32(0));
         let texel = self.emit(Expression::ImageLoad {
             image,
             coordinate,
@@ -438,14 +587,7 @@ impl Around {
             sample: None,
             level: Some(level),
         });
-        let drawn = self.at(texel, 0);
-        let zero = self.emit(Expression::Literal(Literal::U32(0)));
-        let condition = self.binary(BinaryOperator::Equal, drawn, zero);
-        self.push(Statement::If {
-            condition,
-            accept: Block::from_vec(vec![Statement::Kill]),
-            reject: Block::new(),
-        });
+        self.at(texel, 0)
     }
 
     /// What the shader's function returned, one by one.

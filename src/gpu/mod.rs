@@ -13,11 +13,13 @@
 //! `worker` runs all of this in a child.
 
 mod adapter;
+mod blend;
 mod depth;
 mod entry;
 pub mod error;
 mod lavapipe;
 mod opengl;
+mod pass;
 mod read;
 mod render;
 mod resources;

@@ -1,7 +1,8 @@
 //! Pictures read back from the device, as the evaluator gives them.
 
 use super::adapter::Gpu;
-use super::render::{COLOUR, Drawn};
+use super::pass::COLOUR;
+use super::render::Drawn;
 use crate::eval::image::Picture;
 use crate::{Diagnostic, Result};
 
@@ -35,8 +36,8 @@ impl Drawn {
 #[cfg(test)]
 impl Drawn {
     /// A picture on the device, as if it had been drawn there.
-    pub(crate) fn of_picture(gpu: &Gpu, picture: &Picture) -> Self {
-        use super::render::COVERED;
+    pub(crate) fn of_picture(gpu: &Gpu, picture: &Picture, blends: bool) -> Self {
+        use super::pass::COVERED;
         use wgpu::util::DeviceExt;
         let texture = |format, words: Vec<u32>| {
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -63,6 +64,7 @@ impl Drawn {
         Self {
             colour: texture(COLOUR, colours.map(|c| c.to_bits()).collect()),
             covered: texture(COVERED, covered.map(|c| u32::from(*c > 0.0)).collect()),
+            blends,
         }
     }
 }

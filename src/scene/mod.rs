@@ -531,6 +531,11 @@ impl Scene {
             .min((MOST_FRAMES / self.views.len().max(1)).max(1))
     }
 
+    /// Whether any draw of the mesh is blended.
+    pub fn blends(&self) -> bool {
+        self.states.iter().any(|state| state.blend != Blend::Opaque)
+    }
+
     /// How a draw of the mesh gets into the picture.
     pub fn state(&self, draw: usize) -> DrawState {
         state_of(&self.states, draw)

@@ -9,17 +9,16 @@
 
 use super::error::{
     BACKGROUNDS, Details, ErrorFigures, FrameError, Reference, ReferencePixel, Shown, displayed,
-    encoded,
+    encoded, through,
 };
 use super::frame::GRID;
 use super::samples::{OverBlack, offsets};
-use crate::eval::draw::Blend;
+use crate::Result;
 use crate::eval::image::Picture;
 use crate::eval::raster::Frame;
-use crate::gpu::error::{self, ErrorPass, TileSum};
+use crate::gpu::error::{self, ErrorPass, Mean, TileSum};
 use crate::gpu::{Drawn, Gpu, Pipeline, Renderer, Stages};
 use crate::scene::{Output, Scene, chance::child};
-use crate::{Diagnostic, Result};
 
 /// Draws and measures on a device.
 #[derive(Debug)]
@@ -55,16 +54,8 @@ impl<'g> Device<'g> {
     /// Compiles a shader for its scene.
     ///
     /// # Errors
-    /// When the device cannot draw it, or the scene blends surfaces.
+    /// When the device cannot draw it.
     pub fn compile<'a>(&self, stages: Stages<'_>, scene: &'a Scene) -> Result<Compiled<'a>> {
-        let frame = scene.frames(scene.nearest).into_iter().next();
-        let states = frame.map(|frame| frame.states).unwrap_or_default();
-        if states.iter().any(|state| state.blend != Blend::Opaque) {
-            return Err(
-                Diagnostic::error("surfaces that are blended are not drawn on a GPU")
-                    .with_note("the evaluator draws them: `--renderer evaluator`"),
-            );
-        }
         Ok(Compiled {
             pipeline: self.renderer.pipeline(stages, scene)?,
             scene,
@@ -150,7 +141,7 @@ impl<'g> Device<'g> {
             pictures.push(OverBlack {
                 width: picture.width,
                 height: picture.height,
-                pixels: shown(&picture, scene.output)
+                pixels: shown(&picture, (scene.output, scene.blends()))
                     .map(|[black, _]| black)
                     .collect(),
             });
@@ -176,28 +167,39 @@ impl<'g> Device<'g> {
 }
 
 /// What a display shows of a picture's pixels, row by row.
-fn shown(picture: &Picture, output: Output) -> impl Iterator<Item = Shown> + '_ {
+fn shown(picture: &Picture, (output, blends): (Output, bool)) -> impl Iterator<Item = Shown> + '_ {
     let pixels = picture.pixels.iter().zip(&picture.covered);
-    pixels.map(move |(colour, covered)| match *covered > 0.0 {
-        true => [encoded(displayed(output, *colour)); 2],
-        false => BACKGROUNDS,
+    pixels.map(move |(colour, covered)| {
+        if *covered == 0.0 {
+            return BACKGROUNDS;
+        }
+        let black = displayed(output, *colour);
+        let more = match blends {
+            true => through(output, *colour),
+            false => [0.0; 3],
+        };
+        let white = std::array::from_fn(|i| black[i] + more[i]);
+        [black, white].map(encoded)
     })
 }
 
 /// The sum of FLIP over the pixels that a reference or a picture covers, and how many those are.
-fn flip_of(reference: &[[f32; 4]], picture: &Picture, scene: &Scene) -> (f64, usize) {
+fn flip_of(reference: &[Mean], picture: &Picture, scene: &Scene) -> (f64, usize) {
     let width = picture.width;
-    let shown: Vec<Shown> = shown(picture, scene.output).collect();
+    let shown: Vec<Shown> = shown(picture, (scene.output, scene.blends())).collect();
     let pixels = reference.iter().zip(&picture.covered).enumerate();
     let seen: Vec<usize> = pixels
-        .filter(|(_, (pixel, covered))| pixel[3] > 0.0 || **covered > 0.0)
+        .filter(|(_, (pixel, covered))| pixel.coverage > 0.0 || **covered > 0.0)
         .map(|(at, _)| at)
         .collect();
     let reference = Reference::new(seen.iter().map(|&at| {
-        let [r, g, b, coverage] = reference[at];
+        let mean = reference[at];
         let place = [at as u32 % width, at as u32 / width];
-        let pixel = ReferencePixel::new([r, g, b], [1.0 - coverage; 3]);
-        (place, pixel, coverage)
+        (
+            place,
+            ReferencePixel::new(mean.black, mean.more),
+            mean.coverage,
+        )
     }));
     let colours: Vec<Shown> = seen.iter().map(|&at| shown[at]).collect();
     reference.flip(&colours, scene.pixels_per_degree)
@@ -226,7 +228,7 @@ mod tests {
     use crate::scene::ToneMapping;
     use crate::search::error::Tally;
 
-    /// Pictures of so many fine pixels a pixel, of anything that a shader can return.
+    /// Pictures of so many fine pixels a pixel, of any light that a shader can return; alpha is that of a target.
     fn picture(seed: u64, [width, height]: [u32; 2]) -> Picture {
         let mut picture = Picture::empty(width, height);
         let odd = [
@@ -250,7 +252,7 @@ mod tests {
                 continue;
             }
             *covered = 1.0;
-            *pixel = [1, 2, 3, 4].map(|i| match number(10 + i) < 0.02 {
+            *pixel = [1, 2, 3, 4].map(|i| match number(10 + i) < 0.02 && i < 4 {
                 true => odd[(number(20 + i) * odd.len() as f64) as usize],
                 false => number(i) as f32,
             });
@@ -259,24 +261,36 @@ mod tests {
     }
 
     /// What the evaluator's own code makes of the same pictures.
-    fn on_the_host(fine: &Picture, drawings: &[Picture], output: Output) -> FrameError {
-        let mut linear = fine.clone();
-        for (pixel, covered) in linear.pixels.iter_mut().zip(&linear.covered) {
+    fn on_the_host(
+        fine: &Picture,
+        drawings: &[Picture],
+        (output, blends): (Output, bool),
+    ) -> FrameError {
+        let (mut linear, mut more) = (fine.clone(), fine.clone());
+        for (at, covered) in fine.covered.iter().enumerate() {
+            let colour = fine.pixels[at];
+            more.pixels[at] = [1.0; 4];
             if *covered > 0.0 {
-                let [r, g, b] = displayed(output, *pixel);
-                *pixel = [r, g, b, 1.0];
+                let [r, g, b] = displayed(output, colour);
+                linear.pixels[at] = [r, g, b, 1.0];
+                more.pixels[at] = [0.0; 4];
+                if blends {
+                    let [r, g, b] = through(output, colour);
+                    more.pixels[at] = [r, g, b, 1.0];
+                }
             }
         }
-        let mean = linear.box_filtered(GRID);
+        let (mean, more) = (linear.box_filtered(GRID), more.box_filtered(GRID));
         let reference = Reference::new((0..mean.pixels.len()).map(|at| {
             let [r, g, b, _] = mean.pixels[at];
+            let [more @ .., _] = more.pixels[at];
             let place = [at as u32 % mean.width, at as u32 / mean.width];
-            let pixel = ReferencePixel::new([r, g, b], [1.0 - mean.covered[at]; 3]);
+            let pixel = ReferencePixel::new([r, g, b], more);
             (place, pixel, mean.covered[at])
         }));
         let mut tally = Tally::new(&reference);
         for drawing in drawings {
-            tally.add(&shown(drawing, output).collect::<Vec<_>>());
+            tally.add(&shown(drawing, (output, blends)).collect::<Vec<_>>());
         }
         tally.finish()
     }
@@ -327,15 +341,18 @@ mod tests {
             tone_mapping,
         };
         let outputs = [
-            Output::Display,
-            Output::Encoded,
-            light(ToneMapping::None),
-            light(ToneMapping::Reinhard),
-            light(ToneMapping::Aces),
+            (Output::Display, false),
+            (Output::Encoded, false),
+            (light(ToneMapping::None), false),
+            (light(ToneMapping::Reinhard), false),
+            (light(ToneMapping::Aces), false),
+            (Output::Display, true),
+            (Output::Encoded, true),
+            (light(ToneMapping::Reinhard), true),
         ];
         // No whole number of tiles in either direction.
         let size = [21, 13];
-        for (seed, output) in (0..).zip(outputs) {
+        for (seed, (output, blends)) in (0..).zip(outputs) {
             let mut tally = errors.tally(size, 3).unwrap();
             let mut host = Vec::new();
             for (frame, count) in [4, 1, 3].into_iter().enumerate() {
@@ -343,11 +360,13 @@ mod tests {
                 let fine = picture(seed, size.map(|edge| edge * GRID));
                 let drawings: Vec<Picture> =
                     (0..count).map(|i| picture(child(seed, i), size)).collect();
-                host.push(on_the_host(&fine, &drawings, output));
-                let fine = Drawn::of_picture(gpu, &fine);
+                host.push(on_the_host(&fine, &drawings, (output, blends)));
+                let fine = Drawn::of_picture(gpu, &fine, blends);
                 let reference = errors.reference(&fine, GRID, output).unwrap();
-                let drawn: Vec<Drawn> =
-                    drawings.iter().map(|d| Drawn::of_picture(gpu, d)).collect();
+                let drawn: Vec<Drawn> = drawings
+                    .iter()
+                    .map(|d| Drawn::of_picture(gpu, d, blends))
+                    .collect();
                 for drawn in &drawn {
                     errors.add(&mut tally, &reference, drawn, output).unwrap();
                 }
@@ -356,7 +375,10 @@ mod tests {
             let found = errors.sums(&tally).unwrap();
             assert_eq!(found.len(), host.len());
             for ((tiles, host), count) in found.iter().zip(&host).zip([4, 1, 3]) {
-                let what = format!("{output:?}, {count} drawings, on {}", gpu.label());
+                let what = format!(
+                    "{output:?}, blended {blends}, {count} drawings, on {}",
+                    gpu.label()
+                );
                 assert_close(&FrameError::of_tiles(tiles, count), host, &what);
             }
             assert!(host[0].variance > 0.0 && host[1].variance == 0.0 && host[0].sum.max == 1.0);
@@ -374,9 +396,13 @@ mod tests {
         let size = [16, 16];
         let (fine, same) = (picture(1, size.map(|edge| edge * GRID)), picture(2, size));
         let reference = errors
-            .reference(&Drawn::of_picture(&gpu, &fine), GRID, Output::Display)
+            .reference(
+                &Drawn::of_picture(&gpu, &fine, false),
+                GRID,
+                Output::Display,
+            )
             .unwrap();
-        let drawn = Drawn::of_picture(&gpu, &same);
+        let drawn = Drawn::of_picture(&gpu, &same, false);
         let mut tally = errors.tally(size, 1).unwrap();
         for _ in 0..4 {
             errors

@@ -11,8 +11,8 @@ use lodc::eval::program::Program;
 use lodc::eval::raster::{Frame, rasterize};
 use lodc::eval::texture::{Level, Texture};
 use lodc::gpu::{Gpu, Pipeline, Renderer, Stages};
-use lodc::scene::{Output, Scene};
-use lodc::search::error::{displayed, encoded};
+use lodc::scene::Scene;
+use lodc::search::error::{displayed, encoded, held, through};
 use naga::Module;
 use std::sync::Arc;
 
@@ -81,6 +81,11 @@ pub(crate) fn evaluated(
         Some(lit) => lit.shade_into(fragment, &coverage, &frame.bindings, &mut shading),
         None => shade_into(fragment, &coverage, &frame.bindings, &mut shading),
     }
+    if coverage.blends() {
+        for colour in &mut shading.colours {
+            *colour = held(scene.output, *colour);
+        }
+    }
     resolve(&coverage, &shading)
 }
 
@@ -107,6 +112,17 @@ pub(crate) fn drawn(
     picture.unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// What a display shows of a covered pixel over black and over white.
+pub(crate) fn shown(scene: &Scene, colour: [f32; 4]) -> [[f32; 3]; 2] {
+    let black = displayed(scene.output, colour);
+    let more = match scene.blends() {
+        true => through(scene.output, colour),
+        false => [0.0; 3],
+    };
+    let white = std::array::from_fn(|i| black[i] + more[i]);
+    [black, white].map(encoded)
+}
+
 /// How far two pictures are apart.
 #[derive(Default)]
 pub(crate) struct Apart {
@@ -117,17 +133,20 @@ pub(crate) struct Apart {
 }
 
 impl Apart {
-    pub(crate) fn add(&mut self, output: Output, a: &Picture, b: &Picture) {
+    /// Over a black background, and over a white one where the scene blends.
+    pub(crate) fn add(&mut self, scene: &Scene, a: &Picture, b: &Picture) {
         assert_eq!((a.width, a.height), (b.width, b.height));
         for (i, (l, r)) in a.pixels.iter().zip(&b.pixels).enumerate() {
             if a.covered[i] != b.covered[i] {
                 self.edges += 1;
             } else if a.covered[i] > 0.0 {
-                let [l, r] = [*l, *r].map(|c| encoded(displayed(output, c)));
-                for (l, r) in l.into_iter().zip(r) {
-                    let both = l.is_nan() && r.is_nan();
-                    self.differences
-                        .push(if both { 0.0 } else { (l - r).abs() });
+                let [l, r] = [*l, *r].map(|c| shown(scene, c));
+                for (l, r) in l.into_iter().zip(r).take(1 + usize::from(scene.blends())) {
+                    for (l, r) in l.into_iter().zip(r) {
+                        let both = l.is_nan() && r.is_nan();
+                        self.differences
+                            .push(if both { 0.0 } else { (l - r).abs() });
+                    }
                 }
             }
         }

@@ -14,6 +14,16 @@ struct Picture {
     drawings: u32,
     // Where the frame's tiles begin among all.
     first_tile: u32,
+    // Whether colours are premultiplied, with coverage.
+    blends: u32,
+}
+
+// The mean of a pixel's samples, linear and premultiplied: the bits of floats.
+struct Mean {
+    // Over black; their covered share.
+    black: vec4u,
+    // How much more that is over white.
+    more: vec4u,
 }
 
 // What the drawings of a frame leave at a pixel. Differences are over black, then over white; those of the first
@@ -33,8 +43,7 @@ struct Total {
 @group(0) @binding(1) var colours: texture_2d<u32>;
 // 1 where something is drawn.
 @group(0) @binding(2) var covered: texture_2d<u32>;
-// The mean of a pixel's samples, linear and premultiplied, and their covered share: the bits of floats.
-@group(0) @binding(3) var<storage, read_write> reference: array<vec4u>;
+@group(0) @binding(3) var<storage, read_write> reference: array<Mean>;
 @group(0) @binding(4) var<storage, read_write> totals: array<Total>;
 // For each tile: squares, coverage, largest difference, variance.
 @group(0) @binding(5) var<storage, read_write> tiles: array<vec4f>;
@@ -97,6 +106,19 @@ fn displayed(bits: u32) -> f32 {
     return min(light, 1.0);
 }
 
+// How much more it shows over white, where a pixel holds a colour over black of these bits and as much coverage.
+fn through(bits: u32, coverage: u32) -> f32 {
+    if picture.blends == 0u {
+        return 0.0;
+    }
+    let black = displayed(bits);
+    let kept = 1.0 - bitcast<f32>(coverage);
+    if picture.output == 1u {
+        return displayed(bitcast<u32>(bitcast<f32>(bits) + kept)) - black;
+    }
+    return min(kept, 1.0 - black);
+}
+
 // The reference: the mean of each pixel's fine ones.
 @compute @workgroup_size(8, 8)
 fn average(@builtin(global_invocation_id) at: vec3u) {
@@ -104,12 +126,14 @@ fn average(@builtin(global_invocation_id) at: vec3u) {
         return;
     }
     var sum = vec3f();
+    var more = vec3f();
     var nan = vec3<bool>();
     var count = 0u;
     for (var y = 0u; y < picture.grid; y++) {
         for (var x = 0u; x < picture.grid; x++) {
             let fine = at.xy * picture.grid + vec2u(x, y);
             if textureLoad(covered, fine, 0).x == 0u {
+                more += 1.0;
                 continue;
             }
             count++;
@@ -119,13 +143,17 @@ fn average(@builtin(global_invocation_id) at: vec3u) {
                     nan[i] = true;
                 } else {
                     sum[i] += displayed(bits[i]);
+                    more[i] += through(bits[i], bits.w);
                 }
             }
         }
     }
     let all = f32(picture.grid * picture.grid);
     let mean = select(bitcast<vec3u>(sum / all), vec3u(NAN), nan);
-    reference[at.y * picture.size.x + at.x] = vec4u(mean, bitcast<u32>(f32(count) / all));
+    reference[at.y * picture.size.x + at.x] = Mean(
+        vec4u(mean, bitcast<u32>(f32(count) / all)),
+        vec4u(bitcast<vec3u>(more / all), 0u),
+    );
 }
 
 // Adds a drawing.
@@ -136,7 +164,6 @@ fn add(@builtin(global_invocation_id) at: vec3u) {
     }
     let pixel = at.y * picture.size.x + at.x;
     let mean = reference[pixel];
-    let background = 1.0 - bitcast<f32>(mean.w);
     let drawn = textureLoad(covered, at.xy, 0).x != 0u;
     let bits = textureLoad(colours, at.xy, 0);
     var black = vec3f();
@@ -145,9 +172,10 @@ fn add(@builtin(global_invocation_id) at: vec3u) {
         // A NaN in the reference counts as 0, over white too.
         var over_black = 0.0;
         var over_white = 0.0;
-        if !is_nan(mean[i]) {
-            over_black = encode(bitcast<f32>(mean[i]));
-            over_white = encode(bitcast<f32>(mean[i]) + background);
+        if !is_nan(mean.black[i]) {
+            let light = bitcast<f32>(mean.black[i]);
+            over_black = encode(light);
+            over_white = encode(light + bitcast<f32>(mean.more[i]));
         }
         if !drawn {
             black[i] = -over_black;
@@ -157,9 +185,9 @@ fn add(@builtin(global_invocation_id) at: vec3u) {
             black[i] = 1.0;
             white[i] = 1.0;
         } else {
-            let colour = encode(displayed(bits[i]));
-            black[i] = colour - over_black;
-            white[i] = colour - over_white;
+            let light = displayed(bits[i]);
+            black[i] = encode(light) - over_black;
+            white[i] = encode(light + through(bits[i], bits.w)) - over_white;
         }
     }
     let square = (dot(black, black) + dot(white, white)) / 6.0;
@@ -202,7 +230,7 @@ fn finish(
             let spread = total.black_sum.w - (of_black + of_white) / drawings;
             variance = max(spread, 0.0) / (6.0 * (drawings - 1.0));
         }
-        let coverage = bitcast<f32>(reference[pixel].w);
+        let coverage = bitcast<f32>(reference[pixel].black.w);
         share = vec4f(total.black.w, coverage, total.white.w, variance);
     }
     shares[local] = share;

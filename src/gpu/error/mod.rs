@@ -21,7 +21,7 @@ use wgpu::{BindingType, BufferBindingType, BufferUsages, ShaderStages, TextureSa
 pub const TILE: u32 = 8;
 
 /// Bytes of a pixel of the reference, of a pixel's totals and of a tile's sums.
-const OF_REFERENCE: u64 = 16;
+const OF_REFERENCE: u64 = 32;
 const OF_TOTALS: u64 = 64;
 const OF_TILE: u64 = 16;
 
@@ -55,6 +55,17 @@ pub struct Reference {
     pixels: wgpu::Buffer,
 }
 
+/// A pixel of a reference: means over its samples, in linear light as a display shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    /// Over a black background, 0..1, or NaN.
+    pub black: [f32; 3],
+    /// How much more over a white one.
+    pub more: [f32; 3],
+    /// The share of samples where anything is drawn.
+    pub coverage: f32,
+}
+
 /// Error sums of frames of one size, on the device.
 #[derive(Debug)]
 pub struct Tally {
@@ -77,6 +88,7 @@ struct Told {
     output: Output,
     drawings: u32,
     first_tile: u32,
+    blends: bool,
 }
 
 impl Told {
@@ -106,6 +118,7 @@ impl Told {
             exposure.to_bits(),
             self.drawings,
             self.first_tile,
+            self.blends.into(),
         ];
         words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
@@ -188,6 +201,7 @@ impl<'g> ErrorPass<'g> {
             size,
             grid,
             output,
+            blends: fine.blends,
             ..Told::default()
         };
         let reference = Reference { size, pixels };
@@ -241,6 +255,7 @@ impl<'g> ErrorPass<'g> {
         let told = Told {
             size: tally.size,
             output,
+            blends: drawn.blends,
             drawings: tally.drawings,
             ..Told::default()
         };
@@ -310,15 +325,23 @@ impl<'g> ErrorPass<'g> {
         Ok(frames.map(<[TileSum]>::to_vec).collect())
     }
 
-    /// Each pixel of a reference, row by row: the mean of its samples' displayed colours, linear and premultiplied, and
-    /// their covered share.
+    /// Each pixel of a reference, row by row.
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn pixels(&self, reference: &Reference) -> Result<Vec<[f32; 4]>> {
+    pub fn pixels(&self, reference: &Reference) -> Result<Vec<Mean>> {
         let words = words_of(self.gpu, &reference.pixels)?;
-        let pixels = words.as_chunks::<4>().0.iter();
-        Ok(pixels.map(|words| words.map(f32::from_bits)).collect())
+        let pixels = words.as_chunks::<8>().0.iter();
+        Ok(pixels
+            .map(|words| {
+                let [r, g, b, coverage, more @ .., _] = words.map(f32::from_bits);
+                Mean {
+                    black: [r, g, b],
+                    more,
+                    coverage,
+                }
+            })
+            .collect())
     }
 
     /// Runs a pipeline over all pixels of a picture.

@@ -40,7 +40,7 @@ pub fn displayed(output: Output, colour: [f32; 4]) -> [f32; 3] {
 
 /// What the target holds of a fragment's colour that is to be blended: 0..1 in a target that a display shows, light
 /// without a limit in another. Alpha is 0..1; NaN stays NaN.
-pub(crate) fn held(output: Output, colour: [f32; 4]) -> [f32; 4] {
+pub fn held(output: Output, colour: [f32; 4]) -> [f32; 4] {
     let [r, g, b, a] = colour;
     let [r, g, b] = match output {
         Output::Display | Output::Encoded => [r, g, b].map(|c| c.clamp(0.0, 1.0)),
@@ -54,7 +54,7 @@ pub(crate) fn held(output: Output, colour: [f32; 4]) -> [f32; 4] {
 ///
 /// Blending is done where the target does it: in linear light, or, when the shader returns encoded values, in those.
 /// Light without a limit meets the background when it is on the display, for which no light is white there.
-pub(crate) fn through(output: Output, [r, g, b, a]: [f32; 4]) -> [f32; 3] {
+pub fn through(output: Output, [r, g, b, a]: [f32; 4]) -> [f32; 3] {
     let kept = 1.0 - a;
     let black = displayed(output, [r, g, b, a]);
     match output {

@@ -20,8 +20,7 @@ mod held_out;
 mod pixel;
 mod tally;
 
-pub use display::{displayed, encoded};
-pub(crate) use display::{held, through};
+pub use display::{displayed, encoded, held, through};
 pub use figures::{Details, ErrorFigures};
 pub use held_out::HeldOut;
 pub(crate) use held_out::exceeds;

@@ -1,0 +1,390 @@
+//! A pipeline of its own, the material's or the lighting's, and pictures drawn with it.
+
+use super::adapter::Gpu;
+use super::entry::{self, Place, Targets};
+use super::render::Stages;
+use super::resources::{self, Bound, Slot, Slots, Uploads};
+use super::vertices::Layout;
+use super::{blend, lavapipe, opengl};
+use crate::emit::control::pipeline_constant;
+use crate::eval::draw::{Blend, state_of};
+use crate::eval::raster::Frame;
+use crate::{Diagnostic, Result};
+use naga::Module;
+use naga::back::PipelineConstants;
+use naga::back::pipeline_constants::process_overrides;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use wgpu::{BufferBindingType, CompareFunction, ShaderStages, TextureFormat, TextureUsages};
+
+/// The format of colours: the bits of four floats, so that nothing is rounded away, on any device.
+pub(super) const COLOUR: TextureFormat = TextureFormat::Rgba32Uint;
+/// The format of coverage: 1 where something is drawn, else 0.
+pub(super) const COVERED: TextureFormat = TextureFormat::R32Uint;
+/// The format of depths, 0 near to 1 far.
+pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+
+/// A shader with what it draws to, compiled.
+#[derive(Debug)]
+pub(super) struct Pass {
+    pipeline: wgpu::RenderPipeline,
+    /// The same without back faces, where a draw wants that.
+    of_fronts: Option<wgpu::RenderPipeline>,
+    slots: Slots,
+    groups: Vec<Option<wgpu::BindGroupLayout>>,
+    /// Where the frame's place is bound.
+    place: (u32, u32),
+    layout: Layout,
+    /// The formats that it draws to, in order; the coverage's behind them.
+    formats: Vec<TextureFormat>,
+    depth: bool,
+}
+
+/// What a pass draws to, and what it reads that was drawn before.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Drawing {
+    pub(super) targets: Targets,
+    /// The formats of its colours, in order.
+    pub(super) formats: Vec<TextureFormat>,
+    /// The formats of the images that it reads.
+    pub(super) reads: BTreeMap<(u32, u32), TextureFormat>,
+    /// Which fragments hide which; `None` without a depth.
+    pub(super) depth: Option<CompareFunction>,
+    /// Whether some of its draws are without their back faces.
+    pub(super) fronts: bool,
+}
+
+/// The images that it reads, by group and binding.
+pub(super) type Views = BTreeMap<(u32, u32), wgpu::TextureView>;
+
+/// What a pass draws to.
+#[derive(Debug)]
+pub(super) struct Images {
+    pub(super) colours: Vec<wgpu::Texture>,
+    pub(super) covered: wgpu::Texture,
+    pub(super) depth: Option<wgpu::Texture>,
+}
+
+/// A binding of group 0 that neither stage declares: the `nth` of those.
+pub(super) fn free(stages: &Stages<'_>, nth: u32) -> (u32, u32) {
+    let modules = [stages.vertex.0, stages.fragment.0];
+    let globals = modules.iter().flat_map(|m| m.global_variables.iter());
+    let taken = globals.filter_map(|(_, global)| {
+        let at = global.binding.as_ref()?;
+        (at.group == 0).then_some(at.binding + 1)
+    });
+    (0, taken.max().unwrap_or(0) + nth)
+}
+
+impl Pass {
+    /// Compiles a shader.
+    ///
+    /// # Errors
+    /// When the device cannot draw it.
+    pub(super) fn new(gpu: &Gpu, stages: Stages<'_>, drawing: Drawing) -> Result<Self> {
+        let place = free(&stages, 0);
+        let (module, at) = stages.vertex;
+        let (module, at) = settled(gpu, (module, at), None, place)?;
+        let layout = Layout::new(&module, at)?;
+        let vertex = entry::vertex(&module, at, place);
+        let (module, at) = stages.fragment;
+        let (module, at) = settled(gpu, (module, at), stages.auto_lod, place)?;
+        let fragment = entry::fragment(&module, at, place, &drawing.targets);
+
+        let mut slots = Slots::default();
+        for (module, stage) in [
+            (&vertex, ShaderStages::VERTEX),
+            (&fragment, ShaderStages::FRAGMENT),
+        ] {
+            slots.add(gpu, module, &validated(module)?, stage, &drawing.reads)?;
+        }
+        let groups = slots.layouts(gpu);
+        let device = gpu.device();
+        let bind_group_layouts: Vec<_> = groups.iter().map(Option::as_ref).collect();
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &bind_group_layouts,
+            immediate_size: 0,
+        });
+        let compiled = [vertex, fragment].map(|module| {
+            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
+            })
+        });
+        let attributes = layout.attributes();
+        let buffers = [Some(wgpu::VertexBufferLayout {
+            array_stride: layout.stride(),
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &attributes,
+        })];
+        let targets: Vec<Option<wgpu::ColorTargetState>> = drawing
+            .formats
+            .iter()
+            .chain([&COVERED])
+            .map(|format| Some((*format).into()))
+            .collect();
+        let descriptor = wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &compiled[0],
+                entry_point: Some(entry::NAME),
+                compilation_options: Default::default(),
+                buffers: match layout.stride() {
+                    0 => &[],
+                    _ => &buffers,
+                },
+            },
+            primitive: Default::default(),
+            depth_stencil: drawing.depth.map(|compare| wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(compare),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &compiled[1],
+                entry_point: Some(entry::NAME),
+                compilation_options: Default::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        };
+        let of_fronts = drawing.fronts.then(|| {
+            let mut descriptor = descriptor.clone();
+            descriptor.primitive.cull_mode = Some(wgpu::Face::Back);
+            device.create_render_pipeline(&descriptor)
+        });
+        Ok(Self {
+            pipeline: device.create_render_pipeline(&descriptor),
+            of_fronts,
+            slots,
+            groups,
+            place,
+            layout,
+            formats: drawing.formats,
+            depth: drawing.depth.is_some(),
+        })
+    }
+
+    /// Draws those of a frame's draws that are blended, or those that are not, to images that are cleared before. `before`
+    /// is what was drawn that this pass reads.
+    ///
+    /// # Errors
+    /// When the frame lacks what the shader reads.
+    pub(super) fn draw(
+        &self,
+        (gpu, uploads): (&Gpu, &mut Uploads),
+        (frame, blended): (&Frame, bool),
+        before: &Views,
+        images: &Images,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<()> {
+        let mesh = uploads.mesh(gpu, frame, &self.layout);
+        let place = Place::new([frame.width, frame.height], frame.offset, frame.grid);
+        let mut bound = Vec::new();
+        for (number, draw) in frame.mesh.draws().into_iter().enumerate() {
+            let state = state_of(&frame.states, number);
+            if (state.blend != Blend::Opaque) != blended {
+                continue;
+            }
+            let place = place.of_draw(draw.triangles.start as u32, blend::number(state.blend));
+            let bind = |at: (u32, u32), slot: &Slot| match before.get(&at) {
+                _ if at == self.place => {
+                    let ty = BufferBindingType::Uniform;
+                    Ok(Bound::Buffer(resources::buffer(gpu, &place.bytes(), ty)))
+                }
+                Some(view) => Ok(Bound::Texture(view.clone())),
+                None => uploads.bound(gpu, frame, number, at, slot),
+            };
+            bound.push((draw, state, self.bind_groups(gpu, bind)?));
+        }
+        let mut pass = images.cleared(wgpu::Color::TRANSPARENT, 1.0, encoder);
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for (draw, state, groups) in &bound {
+            pass.set_pipeline(match &self.of_fronts {
+                Some(of_fronts) if state.front_only => of_fronts,
+                _ => &self.pipeline,
+            });
+            if let Some(vertices) = &mesh.vertices {
+                let [first, end] = [draw.vertices.start, draw.vertices.end]
+                    .map(|vertex| vertex as u64 * self.layout.stride());
+                pass.set_vertex_buffer(0, vertices.slice(first..end));
+            }
+            for (group, bound) in (0..).zip(groups) {
+                if let Some(bound) = bound {
+                    pass.set_bind_group(group, bound, &[]);
+                }
+            }
+            let [first, end] =
+                [draw.triangles.start, draw.triangles.end].map(|triangle| 3 * triangle as u32);
+            pass.draw_indexed(first..end, 0, 0..1);
+        }
+        Ok(())
+    }
+
+    fn bind_groups(
+        &self,
+        gpu: &Gpu,
+        mut bind: impl FnMut((u32, u32), &Slot) -> Result<Bound>,
+    ) -> Result<Vec<Option<wgpu::BindGroup>>> {
+        let mut groups = Vec::new();
+        for (group, layout) in (0..).zip(&self.groups) {
+            let Some(layout) = layout else {
+                groups.push(None);
+                continue;
+            };
+            let mut bound = Vec::new();
+            for (binding, slot) in self.slots.of_group(group) {
+                bound.push((binding, bind((group, binding), slot)?));
+            }
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = bound
+                .iter()
+                .map(|(binding, bound)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: bound.resource(),
+                })
+                .collect();
+            groups.push(Some(gpu.device().create_bind_group(
+                &wgpu::BindGroupDescriptor {
+                    label: None,
+                    layout,
+                    entries: &entries,
+                },
+            )));
+        }
+        Ok(groups)
+    }
+
+    /// The images of a frame, to be drawn to.
+    pub(super) fn images(&self, gpu: &Gpu, frame: &Frame) -> Images {
+        let image = |format: TextureFormat, usage: TextureUsages| {
+            gpu.device().create_texture(&wgpu::TextureDescriptor {
+                label: None,
+                size: wgpu::Extent3d {
+                    width: frame.width * frame.grid,
+                    height: frame.height * frame.grid,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING | usage,
+                view_formats: &[],
+            })
+        };
+        let colour = |format: &TextureFormat| match *format {
+            COLOUR => image(COLOUR, TextureUsages::COPY_SRC),
+            other => image(other, TextureUsages::empty()),
+        };
+        Images {
+            colours: self.formats.iter().map(colour).collect(),
+            covered: image(COVERED, TextureUsages::COPY_SRC),
+            depth: self.depth.then(|| image(DEPTH, TextureUsages::empty())),
+        }
+    }
+}
+
+impl Images {
+    /// A pass that draws to them, its colours 0 at first, its coverage and depth as said.
+    pub(super) fn cleared<'e>(
+        &self,
+        covered: wgpu::Color,
+        depth: f32,
+        encoder: &'e mut wgpu::CommandEncoder,
+    ) -> wgpu::RenderPass<'e> {
+        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let colours: Vec<wgpu::TextureView> = self.colours.iter().map(view).collect();
+        let coverage = view(&self.covered);
+        let colours = colours.iter().map(|view| (view, wgpu::Color::TRANSPARENT));
+        let attachments: Vec<_> = colours
+            .chain([(&coverage, covered)])
+            .map(|(view, clear)| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(clear),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
+            })
+            .collect();
+        let of_depth = self.depth.as_ref().map(view);
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: None,
+            color_attachments: &attachments,
+            depth_stencil_attachment: of_depth.as_ref().map(|view| {
+                wgpu::RenderPassDepthStencilAttachment {
+                    view,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(depth),
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
+                }
+            }),
+            ..Default::default()
+        })
+    }
+}
+
+/// The module as the device takes it, with its override constants settled, and the place of the entry point in it.
+fn settled(
+    gpu: &Gpu,
+    (module, at): (&Module, usize),
+    auto_lod: Option<f64>,
+    place: (u32, u32),
+) -> Result<(Module, usize)> {
+    let (mut module, at) = without_overrides(module, at, auto_lod)?;
+    if gpu.is_opengl() {
+        opengl::load_depths(&mut module);
+    }
+    if gpu.inlines_uniforms() {
+        lavapipe::hide_uniforms(&mut module, place);
+    }
+    Ok((module, at))
+}
+
+fn without_overrides(module: &Module, at: usize, auto_lod: Option<f64>) -> Result<(Module, usize)> {
+    if module.overrides.is_empty() && auto_lod.is_none() {
+        return Ok((module.clone(), at));
+    }
+    let entry = &module.entry_points[at];
+    let (stage, name) = (entry.stage, &*entry.name);
+    let mut constants = PipelineConstants::default();
+    if let Some(value) = auto_lod {
+        let (_, key) = pipeline_constant(module).ok_or_else(|| {
+            Diagnostic::error("the shader has no override constant `autoLOD`")
+                .with_note("`--form override` writes one")
+        })?;
+        constants.insert(key, value);
+    }
+    let info = validated(module)?;
+    let settled = process_overrides(module, &info, Some((stage, name)), &constants);
+    let (settled, _) = settled.map_err(|error| {
+        Diagnostic::error("an override constant of the shader has no value")
+            .with_reason(error)
+            .with_note("give it a default in the shader")
+    })?;
+    let mut entries = settled.entry_points.iter();
+    let found = entries.position(|entry| entry.stage == stage && entry.name == name);
+    let found = found.ok_or_else(|| Diagnostic::error(format!("the shader has no `{name}`")))?;
+    Ok((settled.into_owned(), found))
+}
+
+fn validated(module: &Module) -> Result<ModuleInfo> {
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    validator.validate(module).map_err(|error| {
+        Diagnostic::error("a shader cannot be drawn as it is")
+            .with_reason(error.emit_to_string(""))
+            .with_note("this is a bug in lodc; the evaluator draws it")
+    })
+}
