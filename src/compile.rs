@@ -9,6 +9,7 @@ mod compare;
 mod init;
 #[cfg(feature = "search")]
 mod search;
+mod snapshot;
 
 #[cfg(feature = "search")]
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
@@ -16,6 +17,7 @@ pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 pub use init::{InitRequest, init};
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect};
+pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
 use crate::front::{self, Modules, Source, Stages};
@@ -91,23 +93,26 @@ impl Request {
         }
     }
 
-    /// Emits under the name that all outputs begin with, and puts the files in their place. A single file gets the
-    /// very name that was asked for.
+    /// Emits under the name that all outputs begin with, and puts the files in their place.
     fn emitted(&self, source: &Source, levels: &[EmitLevel], emission: Output) -> Result<Files> {
         let base = self.base();
         let stem = base.file_name().unwrap_or_default().to_string_lossy();
-        let files = emit::emit_as(source, levels, emission, &stem)?;
+        Ok(self.placed(emit::emit_as(source, levels, emission, &stem)?, &stem))
+    }
+
+    /// Puts files whose names begin with `stem` in their place. A single file gets the very name that was asked for.
+    fn placed(&self, files: Files, stem: &str) -> Files {
         let single = files.len() == 1;
         let placed = files.into_iter().map(|(name, contents)| {
             let name = name.to_string_lossy();
-            let ending = name.strip_prefix(&*stem).unwrap_or(&name);
+            let ending = name.strip_prefix(stem).unwrap_or(&name);
             let place = match &self.output {
                 Some(output) if single => output.clone(),
                 _ => self.beside(ending.trim_start_matches('.')),
             };
             (place, contents)
         });
-        Ok(placed.collect())
+        placed.collect()
     }
 
     /// Refuses to write over what was read.
@@ -161,6 +166,24 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
 /// # Errors
 /// When the source or the lock cannot be read, or the lock is stale.
 pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
+    let read = read_lock(request)?;
+    let emission = request.emission(read.lock.output);
+    let files = request.emitted(&read.source, &read.levels, emission)?;
+    request.spare(&files, std::slice::from_ref(&request.shader))?;
+    Ok((files, read.warnings))
+}
+
+/// A lock with what it was made from, and its levels made again.
+struct Relocked {
+    lock: Lock,
+    source: Source,
+    levels: Vec<EmitLevel>,
+    /// What has changed since, and does not matter for what is written.
+    warnings: Vec<Box<Diagnostic>>,
+}
+
+/// Reads the lock of a request and replays it.
+fn read_lock(request: &Request) -> Result<Relocked> {
     let path = request.lock();
     let (lock, text) = Lock::read(&path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -228,9 +251,12 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
             );
         }
     }
-    let files = request.emitted(&source, &levels, request.emission(lock.output))?;
-    request.spare(&files, std::slice::from_ref(&request.shader))?;
-    Ok((files, warnings))
+    Ok(Relocked {
+        lock,
+        source,
+        levels,
+        warnings,
+    })
 }
 
 /// The way from a folder to a file, with forward slashes; the file's own path when there is none.

@@ -4,7 +4,8 @@
 
 mod fixtures;
 
-use lodc::compile::{self, Request, normal_form};
+use lodc::compile::{self, Request, SnapshotRequest, normal_form};
+use lodc::emit::write_atomically;
 use lodc::eval::draw::shade;
 use lodc::eval::program::Program;
 use lodc::eval::raster::rasterize;
@@ -204,6 +205,41 @@ fn specialised(emitted: &Source, autolod: Option<f64>) -> Source {
     }
 }
 
+/// A snapshot draws what the branching shader draws there, and needs no more bound than the original.
+fn assert_frozen(request: &Request, at: f32, emitted: &Source, scene: &Scene) {
+    let at = f64::from(at);
+    let asked = SnapshotRequest {
+        request: request.clone(),
+        autolod: at,
+        output: None,
+    };
+    let snapshot = compile::snapshot(&asked).unwrap_or_else(|e| panic!("{e}"));
+    let (name, text) = &snapshot.files[0];
+    let text = String::from_utf8(text.clone()).expect("WGSL is text");
+    let frozen = Source::parse(&name.display().to_string(), text).unwrap_or_else(|e| panic!("{e}"));
+    let branching = specialised(emitted, Some(at));
+    let drawn = [&branching, &frozen].map(|source| programs(source, scene));
+    assert_same(&frozen.name, scene, &drawn[0], &drawn[1]);
+    let mut textures = Vec::new();
+    snapshot.each_texture(|texture| textures.push(texture.name.clone()));
+    let declarations = frozen.text.lines().filter(|line| line.contains("@group"));
+    let declared: String = declarations.collect::<Vec<_>>().join("\n");
+    let words: BTreeSet<&str> = declared
+        .split(|c: char| !c.is_alphanumeric() && c != '_')
+        .collect();
+    for need in &snapshot.spared {
+        assert!(
+            !words.contains(&*need.name),
+            "{}: {}",
+            frozen.name,
+            need.name
+        );
+    }
+    for texture in &textures {
+        assert!(words.contains(&**texture), "{}: {texture}", frozen.name);
+    }
+}
+
 #[test]
 fn emitted_levels_have_the_errors_that_are_reported() {
     for path in small_materials() {
@@ -222,6 +258,11 @@ fn emitted_levels_have_the_errors_that_are_reported() {
         for unset in [None, Some(0.0), Some(-1.0)] {
             let level = specialised(&emitted, unset);
             assert_same(&source.name, &scene, &original, &programs(&level, &scene));
+        }
+
+        write_atomically(&compiled.files).unwrap_or_else(|e| panic!("{e}"));
+        for at in compiled.report.levels.iter().map(|level| level.autolod) {
+            assert_frozen(&request, at as f32 + 0.25, &emitted, &scene);
         }
 
         let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));

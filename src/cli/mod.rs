@@ -4,7 +4,7 @@
 mod child;
 mod progress;
 
-use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request};
+use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request, SnapshotRequest};
 use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
 use crate::{Diagnostic, Result, report};
@@ -39,6 +39,8 @@ enum Command {
     Compare(CompareArgs),
     /// Writes the scene file, with everything that is inferred and why
     Init(InitArgs),
+    /// Writes one level of a lock as a shader of its own, and says what it needs bound
+    Snapshot(SnapshotArgs),
     /// Draws on the GPU for the process that started it
     #[cfg(feature = "gpu")]
     #[command(hide = true)]
@@ -58,6 +60,24 @@ struct InitArgs {
     /// Writes over a scene that is there already
     #[arg(long)]
     force: bool,
+}
+
+#[derive(Debug, Args)]
+struct SnapshotArgs {
+    #[command(flatten)]
+    shader: ShaderArgs,
+    /// The level of detail whose level it is: 0 is the original
+    #[arg(long, visible_alias = "at", value_name = "VALUE")]
+    autolod: f64,
+    /// The shader to write [default: beside the source, with .snapshot.wgsl]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The lock [default: beside the source, with .lod.toml]
+    #[arg(long, value_name = "FILE")]
+    lock: Option<PathBuf>,
+    /// The language to write [default: the lock's]
+    #[arg(long, value_enum)]
+    target: Option<Target>,
 }
 
 #[derive(Debug, Args)]
@@ -197,6 +217,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match cli.command {
         Some(Command::Inspect(input)) => inspect(input),
         Some(Command::Init(arguments)) => init(arguments),
+        Some(Command::Snapshot(arguments)) => snapshot(arguments),
         Some(Command::Compare(compared)) => match compare(compared, &arguments) {
             Ok(code) => return code,
             Err(error) => Err(error),
@@ -300,6 +321,24 @@ fn init(arguments: InitArgs) -> Result<()> {
         ),
     });
     Ok(())
+}
+
+fn snapshot(arguments: SnapshotArgs) -> Result<()> {
+    let asked = SnapshotRequest {
+        request: Request {
+            target: arguments.target,
+            output: arguments.lock,
+            ..arguments.shader.request()?
+        },
+        autolod: arguments.autolod,
+        output: arguments.output,
+    };
+    let snapshot = compile::snapshot(&asked)?;
+    for warning in &snapshot.warnings {
+        print_diagnostic(warning);
+    }
+    print(&snapshot.summary());
+    write(&snapshot.files, false)
 }
 
 /// The command that runs, for reports.

@@ -223,7 +223,7 @@ impl Lock {
         if !path.exists() {
             let path = path.display();
             return Err(Diagnostic::error(format!("there is no lock `{path}`"))
-                .with_note("make it first: run lodc without `--locked`"));
+                .with_note("make it first: run lodc on the shader, without `--locked`"));
         }
         let text = read_text(path, "lock")?;
         Ok((Self::parse(&path.display().to_string(), &text)?, text))

@@ -149,12 +149,9 @@ pub fn emit_as(
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     check_thresholds(levels)?;
     let source = &*composed::composed(source)?;
-    let written = |stem: String, text: String| -> Result<Vec<(PathBuf, Vec<u8>)>> {
+    let written = |stem: String, text: String| {
         let read = read_back(&text, source)?;
-        match output.target {
-            Target::Wgsl => Ok(vec![(format!("{stem}.wgsl").into(), text.into_bytes())]),
-            target => targets::write(source, &read, target, &stem),
-        }
+        written(source, &read, &text, output.target, &stem)
     };
     match output.form {
         Form::Override | Form::Uniform => {
@@ -165,13 +162,58 @@ pub fn emit_as(
             written(format!("{stem}.lod"), spliced.text)
         }
         Form::Files => {
-            let mut files = written(format!("{stem}.lod0"), source.text.clone())?;
-            for (at, level) in levels.iter().enumerate() {
-                let text = alone::alone(source, at + 1, level, stem)?;
-                files.extend(written(format!("{stem}.lod{}", at + 1), text)?);
+            let mut files = Vec::new();
+            for number in 0..=levels.len() {
+                let text = level_alone(source, levels, number, stem)?;
+                files.extend(written(format!("{stem}.lod{number}"), text)?);
             }
             Ok(files)
         }
+    }
+}
+
+/// A text that has been read back, in a language: the names of the files begin with `stem`.
+fn written(
+    source: &Source,
+    read: &Source,
+    text: &str,
+    target: Target,
+    stem: &str,
+) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+    match target {
+        Target::Wgsl => Ok(vec![(
+            format!("{stem}.wgsl").into(),
+            text.as_bytes().to_vec(),
+        )]),
+        target => targets::write(source, read, target, stem),
+    }
+}
+
+/// One level as a shader of its own, 0 being the original: as it is read back, and the files that it is. `stem` begins the
+/// name of the lock, and `name` those of the files.
+///
+/// # Errors
+/// As [`emit_as`], and when there is no such level.
+pub(crate) fn one_level(
+    source: &Source,
+    levels: &[EmitLevel],
+    number: usize,
+    target: Target,
+    (stem, name): (&str, &str),
+) -> Result<(Source, Vec<(PathBuf, Vec<u8>)>)> {
+    let source = &*composed::composed(source)?;
+    let text = level_alone(source, levels, number, stem)?;
+    let read = read_back(&text, source)?;
+    let files = written(source, &read, &text, target, name)?;
+    Ok((read, files))
+}
+
+/// The text of one level alone.
+fn level_alone(source: &Source, levels: &[EmitLevel], number: usize, stem: &str) -> Result<String> {
+    let level = number.checked_sub(1).and_then(|at| levels.get(at));
+    match level {
+        Some(level) => alone::alone(source, number, level, stem),
+        None => Ok(source.text.clone()),
     }
 }
 

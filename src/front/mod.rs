@@ -21,6 +21,7 @@ mod modules;
 pub(crate) mod names;
 mod parse;
 pub(crate) mod settle;
+pub(crate) mod used;
 mod vertex_stage;
 
 pub use entry::{Input, Stages, inputs};

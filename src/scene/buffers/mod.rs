@@ -1,6 +1,5 @@
 //! Uniform and read-only storage buffers: what every part of them holds, from the scene file or inferred.
 
-mod used;
 mod value;
 
 use super::camera::{Pose, Sphere};
@@ -13,12 +12,12 @@ use super::{Inference, Missing};
 use crate::eval::machine::Resource;
 use crate::front::Source;
 use crate::front::names::words;
+use crate::front::used::Used;
 use crate::{Diagnostic, Result};
 use naga::valid::GlobalUse;
 use naga::{AddressSpace, GlobalVariable, Handle, Module, ScalarKind};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use used::Used;
 pub(super) use value::has;
 use value::read_entry;
 

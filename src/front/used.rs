@@ -1,13 +1,13 @@
 //! Which parts of a buffer the chosen entry points may read: the others need no value.
 
-use crate::front::Source;
+use super::Source;
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{Expression, Function, GlobalVariable, Handle, Module};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Which members of a buffer's struct the chosen entry points may read.
 #[derive(Debug, PartialEq)]
-pub(super) enum Used {
+pub(crate) enum Used {
     Nothing,
     All,
     /// The names of the variable's members.
@@ -15,7 +15,7 @@ pub(super) enum Used {
 }
 
 impl Used {
-    pub(super) fn of(source: &Source, handle: Handle<GlobalVariable>) -> Self {
+    pub(crate) fn of(source: &Source, handle: Handle<GlobalVariable>) -> Self {
         let entries = [
             Some(source.fragment_entry().0),
             source.vertex_entry().map(|(i, _)| i),
@@ -62,11 +62,13 @@ impl Used {
         Self::Members(names)
     }
 
-    pub(super) fn any(&self) -> bool {
+    #[cfg(feature = "search")]
+    pub(crate) fn any(&self) -> bool {
         *self != Self::Nothing
     }
 
-    pub(super) fn uses(&self, path: &str) -> bool {
+    #[cfg(feature = "search")]
+    pub(crate) fn uses(&self, path: &str) -> bool {
         match self {
             Self::Nothing => false,
             Self::All => true,
