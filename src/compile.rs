@@ -94,10 +94,16 @@ impl Request {
     }
 
     /// Emits under the name that all outputs begin with, and puts the files in their place.
-    fn emitted(&self, source: &Source, levels: &[EmitLevel], emission: Output) -> Result<Files> {
+    fn emitted(
+        &self,
+        (source, shader): (&Source, &Shader),
+        levels: &[EmitLevel],
+        emission: Output,
+    ) -> Result<Files> {
         let base = self.base();
         let stem = base.file_name().unwrap_or_default().to_string_lossy();
-        Ok(self.placed(emit::emit_as(source, levels, emission, &stem)?, &stem))
+        let files = emit::emit_as(source, shader, levels, emission, &stem)?;
+        Ok(self.placed(files, &stem))
     }
 
     /// Puts files whose names begin with `stem` in their place. A single file gets the very name that was asked for.
@@ -168,7 +174,7 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
 pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
     let read = read_lock(request)?;
     let emission = request.emission(read.lock.output);
-    let files = request.emitted(&read.source, &read.levels, emission)?;
+    let files = request.emitted((&read.source, &read.base), &read.levels, emission)?;
     request.spare(&files, std::slice::from_ref(&request.shader))?;
     Ok((files, read.warnings))
 }
@@ -177,6 +183,8 @@ pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
 struct Relocked {
     lock: Lock,
     source: Source,
+    /// Its normal form.
+    base: Shader,
     levels: Vec<EmitLevel>,
     /// What has changed since, and does not matter for what is written.
     warnings: Vec<Box<Diagnostic>>,
@@ -254,6 +262,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
     Ok(Relocked {
         lock,
         source,
+        base,
         levels,
         warnings,
     })

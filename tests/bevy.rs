@@ -238,7 +238,9 @@ fn there_are_levels_and_the_lock_makes_them_again() {
 
     // Level 0, as it is written, draws what Bevy's modules do.
     let source = composed(&folders, &scene, &[]);
-    let plain = emit(&source, &[], Output::default()).unwrap_or_else(|error| panic!("{error}"));
+    let base = compile::normal_form(&source).unwrap_or_else(|error| panic!("{error}"));
+    let plain =
+        emit(&source, &base, &[], Output::default()).unwrap_or_else(|error| panic!("{error}"));
     let plain = String::from_utf8(plain[0].1.clone()).expect("it is text");
     let plain = Source::parse("plain", plain).unwrap_or_else(|error| panic!("{error}"));
     let drawn = Scene::read(&source, Some(&scene)).unwrap_or_else(|error| panic!("{error}"));

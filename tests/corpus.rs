@@ -393,7 +393,7 @@ fn through(path: &Path, stages: &mut usize) -> Result<()> {
         cost: 1.0,
         says: "some edits".to_owned(),
     };
-    let files = emit::emit(&source, &[level], Output::default())?;
+    let files = emit::emit(&source, &base, &[level], Output::default())?;
     let text = String::from_utf8_lossy(&files[0].1).into_owned();
     let chosen = Stages {
         vertex: source.vertex.clone(),

@@ -151,20 +151,13 @@ fn simplified(base: &Shader, count: usize) -> Shader {
 }
 
 /// The levels that a shader is emitted with here: its normal form, and two simpler ones.
-fn levels(source: &Source) -> Vec<EmitLevel> {
-    let base = normalize(
-        &source.module,
-        source.vertex.as_deref(),
-        &source.fragment,
-        100_000,
-    )
-    .unwrap_or_else(|e| panic!("{}: {e}", source.name));
+fn levels(base: &Shader) -> Vec<EmitLevel> {
     [0, 3, 12]
         .iter()
         .enumerate()
         .map(|(at, &count)| EmitLevel {
             autolod: 0.5 + at as f32,
-            shader: simplified(&base, count),
+            shader: simplified(base, count),
             distance: 2.0,
             error: 0.01,
             cost: 0.5,
@@ -179,9 +172,16 @@ fn emitted(folder: &str) {
     for path in fixtures::shaders(Path::new("testdata").join(folder)) {
         let name = stem(&path);
         let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
-        let levels = levels(&source);
+        let base = normalize(
+            &source.module,
+            source.vertex.as_deref(),
+            &source.fragment,
+            100_000,
+        )
+        .unwrap_or_else(|e| panic!("{}: {e}", source.name));
+        let levels = levels(&base);
         for form in [Form::Override, Form::Uniform, Form::Files] {
-            let write = |target| emit::emit(&source, &levels, Output { form, target });
+            let write = |target| emit::emit(&source, &base, &levels, Output { form, target });
             for (path, bytes) in write(Target::Wgsl).unwrap_or_else(|e| panic!("{e}")) {
                 let stem = path.file_stem().expect("a name").to_string_lossy();
                 let text = String::from_utf8(bytes).expect("WGSL is text");

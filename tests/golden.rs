@@ -66,7 +66,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
-    let stages = |shader: &Shader| stages(&source, shader, pass.name() == "vertex-motion");
+    let both = pass.name() == "vertex-motion";
+    let stages = |variant: &Shader| stages((&source, &shader), variant, both);
     let before = stages(&shader);
     let mut golden = String::new();
     let mut offered = 0;
@@ -95,7 +96,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
 }
 
 /// The text of a variant's fragment stage, or of both with what they declare, as emitted.
-fn stages(source: &Source, shader: &Shader, both: bool) -> String {
+fn stages((source, base): (&Source, &Shader), shader: &Shader, both: bool) -> String {
     let level = EmitLevel {
         autolod: 1.0,
         shader: shader.clone(),
@@ -108,8 +109,8 @@ fn stages(source: &Source, shader: &Shader, both: bool) -> String {
         form: Form::Files,
         ..Output::default()
     };
-    let files =
-        emit::emit(source, &[level], output).unwrap_or_else(|e| panic!("{}: {e}", source.name));
+    let files = emit::emit(source, base, &[level], output)
+        .unwrap_or_else(|e| panic!("{}: {e}", source.name));
     let (_, bytes) = files.last().expect("one file a level");
     let text = String::from_utf8(bytes.clone()).expect("WGSL is text");
     let start = match both {

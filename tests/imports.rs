@@ -221,7 +221,8 @@ fn what_is_written_is_one_module_and_the_lock_makes_it_again() {
     }
     // What is written for level 0 does what the composed module does.
     let source = read(&folder, &["FOG", "LIGHTS=3"]);
-    let written = emit(&source, &[], Output::default()).unwrap_or_else(|e| panic!("{e}"));
+    let base = compile::normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+    let written = emit(&source, &base, &[], Output::default()).unwrap_or_else(|e| panic!("{e}"));
     let written = String::from_utf8(written[0].1.clone()).expect("it is text");
     let written = Source::parse("written", written).unwrap_or_else(|e| panic!("{e}"));
     let normal = |source| compile::normal_form(source).expect("it has a normal form");

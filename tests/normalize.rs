@@ -38,7 +38,7 @@ fn golden(path: &Path) -> String {
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let level = EmitLevel {
         autolod: 1.0,
-        shader,
+        shader: shader.clone(),
         distance: 1.0,
         error: 0.0,
         cost: 1.0,
@@ -48,7 +48,7 @@ fn golden(path: &Path) -> String {
         form: Form::Files,
         ..Output::default()
     };
-    let files = emit::emit(&source, &[level], output).unwrap_or_else(|e| fail(&e));
+    let files = emit::emit(&source, &shader, &[level], output).unwrap_or_else(|e| fail(&e));
     let (_, bytes) = files.last().expect("one file a level");
     let after = String::from_utf8(bytes.clone()).expect("WGSL is text");
     // Without the comment that every emitted file begins with.

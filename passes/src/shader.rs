@@ -288,6 +288,13 @@ impl Shader {
     pub fn fingerprint(&self) -> Fingerprint {
         crate::fingerprint::of(&self.module)
     }
+
+    /// The same of one stage's entry point; `None` when the shader lacks the stage.
+    pub fn stage_fingerprint(&self, stage: Stage) -> Option<Fingerprint> {
+        let function = self.function(stage)?;
+        let declared = crate::fingerprint::Declared::of(&self.module);
+        Some(crate::fingerprint::of_function(&declared, function))
+    }
 }
 
 /// The types of a function's expressions.

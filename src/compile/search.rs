@@ -182,7 +182,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     // What cannot be written should be known before a search that takes a minute.
     let emission = request.emission(Output::default());
-    let trial = request.emitted(&ready.source, &[], emission)?;
+    let trial = request.emitted((&ready.source, &ready.base), &[], emission)?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
 
@@ -201,7 +201,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .map(emit_level)
         .collect();
 
-    let mut files = request.emitted(&ready.source, &levels, emission)?;
+    let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
     let lock = request.lock();
     files.push((
         lock.clone(),

@@ -6,7 +6,7 @@ use super::{EmitLevel, file_name, flaw, read_back};
 use crate::front::Source;
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
-use naga::Module;
+use naga::{Module, StructMember, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A text with levels to be put behind it, and the module that it was parsed to.
@@ -125,6 +125,7 @@ pub(crate) fn renamed_module(body: &Body<'_>, level: &EmitLevel) -> Module {
             module.types.replace(handle, ty);
         }
     }
+    rename_other_structs(&mut module, body);
     for (_, variable) in module.global_variables.iter_mut() {
         if rename(&mut variable.name) {
             variable.init = None;
@@ -142,6 +143,35 @@ pub(crate) fn renamed_module(body: &Body<'_>, level: &EmitLevel) -> Module {
         }
     }
     module
+}
+
+/// Gives structs of a level that are called as one of the text is, but have other members, names of their own.
+fn rename_other_structs(module: &mut Module, body: &Body<'_>) {
+    let handles: Vec<_> = module.types.iter().map(|(handle, _)| handle).collect();
+    let mut names = Names::default();
+    names.reserve(body.text.words.iter().copied());
+    for handle in handles {
+        let ty = &module.types[handle];
+        let (TypeInner::Struct { members, .. }, Some(name)) = (&ty.inner, &ty.name) else {
+            continue;
+        };
+        let mut authors = body.module.types.iter();
+        let authors = authors.find(|(_, authors)| authors.name.as_ref() == Some(name));
+        let is_other = match authors.map(|(_, authors)| &authors.inner) {
+            Some(TypeInner::Struct {
+                members: authors, ..
+            }) => {
+                let binding = |member: &StructMember| (member.name.clone(), member.binding.clone());
+                !members.iter().map(binding).eq(authors.iter().map(binding))
+            }
+            _ => false,
+        };
+        if is_other {
+            let mut ty = ty.clone();
+            ty.name = Some(names.take(name));
+            module.types.replace(handle, ty);
+        }
+    }
 }
 
 /// Says that a level cannot be written.

@@ -34,11 +34,16 @@ pub(crate) fn pipeline_constant(module: &Module) -> Option<(Handle<Override>, St
 }
 
 impl Control {
-    /// Finds the author's, or makes one in this form.
+    /// Finds the author's, or makes one in this form, for the fragment stage alone or for both.
     ///
     /// # Errors
     /// When the author's is nothing that a host sets.
-    pub(crate) fn new(body: &Body<'_>, form: Form, names: &mut Names) -> Result<Self> {
+    pub(crate) fn new(
+        body: &Body<'_>,
+        form: Form,
+        both_stages: bool,
+        names: &mut Names,
+    ) -> Result<Self> {
         let (source, text, module) = (body.source, &body.text, body.module);
         if let Some(own) = Self::own(module) {
             return Ok(own);
@@ -72,10 +77,14 @@ impl Control {
                 let (group, binding) = free_binding(module);
                 let ty = names.take("LevelOfDetail");
                 let variable = names.take("level_of_detail");
+                let read = match both_stages {
+                    true => "; both stages read it",
+                    false => "",
+                };
                 Self {
                     value: format!("{variable}.{NAME}"),
                     declaration: Some(format!(
-                        "// Halvings of scale on screen since the nearest view; 0 is the original.\n\
+                        "// Halvings of scale on screen since the nearest view; 0 is the original{read}.\n\
                          struct {ty} {{\n    @size(16) {NAME}: f32,\n}}\n\
                          @group({group}) @binding({binding}) var<uniform> {variable}: {ty};\n"
                     )),

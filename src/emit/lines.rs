@@ -11,6 +11,7 @@ use naga::{
     AddressSpace, BinaryOperator, Block, Expression, Function, Handle, ImageClass, Module,
     Statement, StorageAccess, TypeInner,
 };
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 /// From how many characters on an expression gets a line of its own.
@@ -136,7 +137,20 @@ pub(crate) fn plan(module: &Module, function: &Function, info: &FunctionInfo) ->
         }
     }
 
-    name_long_ones(&mut lines, function, &may_be_named, &writer_names);
+    let is_returned = |value: Handle<Expression>| {
+        let is_struct = matches!(
+            info[value].ty.inner_with(&module.types),
+            TypeInner::Struct { .. }
+        );
+        is_struct && info[value].ref_count == 1 && passed_on.contains(&value)
+    };
+    name_long_ones(
+        &mut lines,
+        function,
+        &may_be_named,
+        &is_returned,
+        &writer_names,
+    );
 
     // Local variables, once everything else has its place.
     let is_let = |value: Handle<Expression>, lines: &Lines| {
@@ -188,11 +202,13 @@ fn is_path(
     }
 }
 
-/// Gives a line to what would be too long in place, from the operands up.
+/// Gives a line to what would be too long in place, from the operands up. `is_returned` says of a struct that it is
+/// returned or stored as it is made.
 fn name_long_ones(
     lines: &mut Lines,
     function: &Function,
     may_be_named: &dyn Fn(Handle<Expression>) -> bool,
+    is_returned: &dyn Fn(Handle<Expression>) -> bool,
     writer_names: &dyn Fn(Handle<Expression>, &Lines) -> bool,
 ) {
     /// What a name takes.
@@ -214,7 +230,21 @@ fn name_long_ones(
             length += lengths.get(operand.index()).copied().unwrap_or(NAME);
         });
         let in_place = !writer_names(value, lines) || lines.inline.contains(&value);
-        if in_place && length > LONG && may_be_named(value) {
+        if in_place && length > LONG && is_returned(value) {
+            // A name for all of it would make nothing shorter: its longest members get theirs.
+            let mut members = Vec::new();
+            operands::each(expression, |member| members.push(member));
+            members.sort_by_key(|member| (Reverse(lengths[member.index()]), *member));
+            for member in members {
+                let own = lengths[member.index()];
+                if length > LONG && own > NAME && may_be_named(member) {
+                    lines.inline.remove(&member);
+                    lines.named.insert(member);
+                    lengths[member.index()] = NAME;
+                    length -= own - NAME;
+                }
+            }
+        } else if in_place && length > LONG && may_be_named(value) {
             lines.inline.remove(&value);
             lines.named.insert(value);
         }

@@ -14,6 +14,7 @@ mod alone;
 mod body;
 mod composed;
 pub(crate) mod control;
+mod level;
 mod lines;
 mod lock;
 mod print;
@@ -23,6 +24,8 @@ mod splice;
 mod targets;
 mod tidy;
 mod tokens;
+mod varyings;
+mod vertex;
 mod write;
 
 #[cfg(test)]
@@ -32,6 +35,7 @@ pub use lock::{
     FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure,
 };
 pub use says::says;
+pub use varyings::shared_locations;
 pub use write::{writable, write_atomically};
 
 use crate::front::{Source, Stages};
@@ -123,16 +127,18 @@ pub struct EmitLevel {
     pub says: String,
 }
 
-/// Emits a shader with its levels. The files come back as names, to be put beside the source, and contents.
+/// Emits a shader with its levels, which were made from its normal form, `base`. The files come back as names, to be put
+/// beside the source, and contents.
 ///
 /// # Errors
 /// As [`emit_as`].
 pub fn emit(
     source: &Source,
+    base: &Shader,
     levels: &[EmitLevel],
     output: Output,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
-    emit_as(source, levels, output, &stem(source))
+    emit_as(source, base, levels, output, &stem(source))
 }
 
 /// As [`emit`], with names that begin with `stem` in the place of the source's: that of the lock too, which
@@ -143,6 +149,7 @@ pub fn emit(
 /// that cannot be used, or a writer has no form for something in the shader.
 pub fn emit_as(
     source: &Source,
+    base: &Shader,
     levels: &[EmitLevel],
     output: Output,
     stem: &str,
@@ -155,7 +162,7 @@ pub fn emit_as(
     };
     match output.form {
         Form::Override | Form::Uniform => {
-            let spliced = splice::splice(source, levels, output.form, stem)?;
+            let spliced = splice::splice(source, base, levels, output.form, stem)?;
             if output.target != Target::Wgsl && spliced.by_override {
                 return Err(no_override(output.target));
             }

@@ -56,8 +56,12 @@ pub(crate) struct Signature {
     pub(crate) name: Range<usize>,
     /// The names of the parameters.
     pub(crate) parameters: Vec<Range<usize>>,
-    /// Whether it returns a value.
-    pub(crate) returns: bool,
+    /// Where further parameters go: behind all that stands between the brackets.
+    further: usize,
+    /// What stands between parameters, and what in front of the first further one.
+    separators: [String; 2],
+    /// What it returns, with its attributes.
+    pub(crate) result: Option<Range<usize>>,
     /// Each attribute, as the spans of its tokens.
     attributes: Vec<Vec<Range<usize>>>,
 }
@@ -247,7 +251,8 @@ impl<'a> Text<'a> {
         let all = declaration.tokens.clone();
         let mut attributes = Vec::new();
         let mut parameters = Vec::new();
-        let mut returns = false;
+        let mut result = None;
+        let mut brackets = None;
         let mut depth = 0usize;
         let mut at = all.start;
         while at < all.end && self.word(at) != "{" {
@@ -258,21 +263,75 @@ impl<'a> Text<'a> {
                     at = end;
                     continue;
                 }
+                "(" if depth == 0 => {
+                    brackets = Some((at, self.after_group(at) - 1));
+                    depth = 1;
+                }
                 "(" | "[" => depth += 1,
                 ")" | "]" => depth = depth.saturating_sub(1),
-                "-" if depth == 0 && self.word(at + 1) == ">" => returns = true,
+                "-" if depth == 0 && self.word(at + 1) == ">" => result = Some(at + 2),
                 ":" if depth == 1 => parameters.push(self.tokens[at - 1].span.clone()),
                 _ => {}
             }
             at += 1;
         }
+        let end = self.tokens[at - 1].span.end;
+        let (open, close) = brackets?;
+        let further = self.tokens[close - 1].span.end;
+        // Where the author gives each parameter a line, further ones get one each.
+        let before = &self.text[self.tokens[open].span.end..self.tokens[open + 1].span.start];
+        let blank = match before.rfind('\n') {
+            Some(line) if close > open + 1 => {
+                let blank = &before[line..];
+                &blank[..blank.len() - blank.trim_start().len()]
+            }
+            _ => " ",
+        };
+        let first = match self.word(close - 1) {
+            "(" => String::new(),
+            "," => blank.to_owned(),
+            _ => format!(",{blank}"),
+        };
         Some(Signature {
-            span: self.tokens[all.start].span.start..self.tokens[at - 1].span.end,
+            span: self.tokens[all.start].span.start..end,
             name: declaration.name_span.clone(),
             parameters,
-            returns,
+            further,
+            separators: [format!(",{blank}"), first],
+            result: result.map(|result| self.tokens[result].span.start..end),
             attributes,
         })
+    }
+
+    /// The text with functions made ordinary ones: their names replaced, and every attribute of their signatures
+    /// taken off that belongs to entry points. Line ends and comments stay, so that every line keeps its number.
+    pub(crate) fn demoted(&self, functions: &[(&Signature, &str)]) -> String {
+        let mut out = String::with_capacity(self.text.len());
+        let mut at = 0;
+        let mut edits: BTreeMap<usize, (Range<usize>, &str)> = BTreeMap::new();
+        for (signature, name) in functions {
+            edits.insert(signature.name.start, (signature.name.clone(), name));
+            for attribute in &signature.attributes {
+                let kept = attribute.get(1).is_some_and(|word| {
+                    matches!(&self.text[word.clone()], "diagnostic" | "must_use")
+                });
+                if kept {
+                    continue;
+                }
+                for token in attribute {
+                    let after = &self.text[token.end..];
+                    let blanks = after.len() - after.trim_start_matches([' ', '\t']).len();
+                    edits.insert(token.start, (token.start..token.end + blanks, ""));
+                }
+            }
+        }
+        for (span, with) in edits.into_values() {
+            out.push_str(&self.text[at..span.start]);
+            out.push_str(with);
+            at = span.end;
+        }
+        out.push_str(&self.text[at..]);
+        out
     }
 
     /// What a function's text lets pass for derivatives in control flow that is not uniform: the most
@@ -294,55 +353,43 @@ impl<'a> Text<'a> {
 }
 
 impl Signature {
-    /// The text with this function made an ordinary one: its name replaced, and every attribute taken off
-    /// that belongs to entry points. Line ends and comments stay, so that every line keeps its number.
-    pub(crate) fn demoted(&self, text: &Text<'_>, name: &str) -> String {
-        let mut out = String::with_capacity(text.text.len() + name.len());
-        let mut at = 0;
-        let mut edits: BTreeMap<usize, (Range<usize>, &str)> = BTreeMap::new();
-        edits.insert(self.name.start, (self.name.clone(), name));
-        for attribute in &self.attributes {
-            let kept = attribute
-                .get(1)
-                .is_some_and(|word| matches!(&text.text[word.clone()], "diagnostic" | "must_use"));
-            if kept {
-                continue;
-            }
-            for token in attribute {
-                let after = &text.text[token.end..];
-                let blanks = after.len() - after.trim_start_matches([' ', '\t']).len();
-                edits.insert(token.start, (token.start..token.end + blanks, ""));
-            }
+    /// The signature as it stands, but for the parameters' names, with further parameters behind, and with another
+    /// result where one is given.
+    pub(crate) fn with(
+        &self,
+        text: &Text<'_>,
+        names: &[String],
+        further: &[&str],
+        result: Option<&str>,
+    ) -> String {
+        let mut out = String::new();
+        let mut at = self.span.start;
+        for (parameter, name) in self.parameters.iter().zip(names) {
+            out.push_str(&text.text[at..parameter.start]);
+            out.push_str(name);
+            at = parameter.end;
         }
-        for (span, with) in edits.into_values() {
-            out.push_str(&text.text[at..span.start]);
-            out.push_str(with);
-            at = span.end;
+        if !further.is_empty() {
+            let [between, first] = &self.separators;
+            out.push_str(&text.text[at..self.further]);
+            out.push_str(first);
+            out.push_str(&further.join(between));
+            at = self.further;
         }
-        out.push_str(&text.text[at..]);
+        match (&self.result, result) {
+            (Some(old), Some(new)) => {
+                out.push_str(&text.text[at..old.start]);
+                out.push_str(new);
+            }
+            _ => out.push_str(&text.text[at..self.span.end]),
+        }
         out
     }
 
-    /// The signature as it stands, with parameters renamed where `rename` says so, and the parameters' names
-    /// after that.
-    pub(crate) fn with_parameters(
-        &self,
-        text: &Text<'_>,
-        mut rename: impl FnMut(&str) -> Option<String>,
-    ) -> (String, Vec<String>) {
-        let mut out = String::new();
-        let mut names = Vec::new();
-        let mut at = self.span.start;
-        for parameter in &self.parameters {
-            let name = &text.text[parameter.clone()];
-            let name = rename(name).unwrap_or_else(|| name.to_owned());
-            out.push_str(&text.text[at..parameter.start]);
-            out.push_str(&name);
-            at = parameter.end;
-            names.push(name);
-        }
-        out.push_str(&text.text[at..self.span.end]);
-        (out, names)
+    /// The names of the parameters.
+    pub(crate) fn names<'a>(&self, text: &Text<'a>) -> Vec<&'a str> {
+        let parameters = self.parameters.iter();
+        parameters.map(|name| &text.text[name.clone()]).collect()
     }
 }
 
@@ -353,7 +400,7 @@ mod tests {
     fn demoted(text: &str) -> String {
         let text = Text::new(text);
         let signature = text.signature("main").expect("it is there");
-        signature.demoted(&text, "original_main")
+        text.demoted(&[(&signature, "original_main")])
     }
 
     #[test]
@@ -438,20 +485,45 @@ mod tests {
             "@fragment fn main(@location(0) a: array<vec2<f32>, 2>, @builtin(front_facing) b: bool,) // no { here\n{ }",
         );
         let signature = text.signature("main").expect("it is there");
-        let (written, names) =
-            signature.with_parameters(&text, |name| (name == "a").then(|| "c".to_owned()));
-        assert_eq!(names, ["c", "b"]);
-        assert!(!signature.returns);
+        assert_eq!(signature.names(&text), ["a", "b"]);
+        assert_eq!(signature.result, None);
         assert_eq!(
-            written,
+            signature.with(&text, &["c".to_owned(), "b".to_owned()], &[], None),
             "@fragment fn main(@location(0) c: array<vec2<f32>, 2>, @builtin(front_facing) b: bool,)"
         );
-        assert!(
-            Text::new("fn main() -> @location(0) vec4f {}")
-                .signature("main")
-                .expect("it is there")
-                .returns
-        );
+    }
+
+    #[test]
+    fn signatures_take_further_parameters_and_another_result() {
+        for (text, wanted) in [
+            ("fn main() {}", "fn main(x: f32, y: f32)"),
+            (
+                "fn main() -> @location(0) vec4<f32> {}",
+                "fn main(x: f32, y: f32) -> R",
+            ),
+            (
+                "fn main(a: f32 /* of */) -> f32 {}",
+                "fn main(a: f32, x: f32, y: f32 /* of */) -> R",
+            ),
+            (
+                "fn main(@builtin(position) a: vec4f,)->@builtin(position) vec4f {}",
+                "fn main(@builtin(position) a: vec4f, x: f32, y: f32)->R",
+            ),
+            (
+                "fn main(\n  a: f32,\n  b: f32 // last\n) -> f32 {}",
+                "fn main(\n  a: f32,\n  b: f32,\n  x: f32,\n  y: f32 // last\n) -> R",
+            ),
+            (
+                "fn main(\n\ta: f32,\n) {}",
+                "fn main(\n\ta: f32,\n\tx: f32,\n\ty: f32\n)",
+            ),
+        ] {
+            let text = Text::new(text);
+            let signature = text.signature("main").expect("it is there");
+            let names: Vec<String> = signature.names(&text).iter().map(|n| (*n).into()).collect();
+            let further = ["x: f32", "y: f32"];
+            assert_eq!(signature.with(&text, &names, &further, Some("R")), wanted);
+        }
     }
 
     #[test]

@@ -1,14 +1,20 @@
-//! Puts levels behind the author's text, and an entry point that chooses among them.
+//! Puts levels behind the author's text, and entry points that choose among them.
+//!
+//! The fragment stage always chooses; the vertex stage does where a level has another than the author's.
 
-use super::body::{Body, Hidden, over_text, renamed_module, unwritable};
+use super::body::{Body, Hidden, over_text};
 use super::control::Control;
+use super::level::fragment_function;
 use super::lock::FORMAT;
-use super::print::{Item, Owner, Printed, Wishes, print, value_name};
-use super::{EmitLevel, Form, file_name, flaw};
+use super::print::{Item, Printed};
+use super::source::Signature;
+use super::varyings::Varyings;
+use super::vertex::{VertexStage, has_own_vertex_stage};
+use super::{EmitLevel, Form, file_name};
 use crate::front::Source;
 use crate::front::identifiers::{Names, in_words};
 use crate::{Diagnostic, Result};
-use lodc_passes::shader::Stage;
+use lodc_passes::Shader;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -19,100 +25,202 @@ pub(crate) struct Spliced {
     pub(crate) by_override: bool,
 }
 
-/// The author's text, with the fragment entry point replaced by one that chooses among it and the levels.
+/// The author's text, with entry points replaced by ones that choose among it and the levels. `base` is its normal form.
 pub(crate) fn splice(
     source: &Source,
+    base: &Shader,
     levels: &[EmitLevel],
     form: Form,
     stem: &str,
 ) -> Result<Spliced> {
-    over_text(source, |body| spliced(body, levels, form, stem))
+    over_text(source, |body| spliced(body, base, levels, form, stem))
 }
 
 fn spliced(
     body: &Body<'_>,
+    base: &Shader,
     levels: &[EmitLevel],
     form: Form,
     stem: &str,
 ) -> Result<std::result::Result<Spliced, Hidden>> {
     let (source, text) = (body.source, &body.text);
+    let varyings = Varyings::of(base, levels.iter().map(|level| &level.shader));
+    let of_vertex = has_own_vertex_stage(base, levels, &varyings);
+    let vertex = source.vertex.as_ref().filter(|_| of_vertex.contains(&true));
     let mut names = Names::default();
     names.reserve(text.words.iter().copied());
-    let control = Control::new(body, form, &mut names)?;
+    let control = Control::new(body, form, vertex.is_some(), &mut names)?;
     let mut out = header(source, levels, stem);
     let line_break = |out: &mut String| {
         if !out.is_empty() && !out.ends_with('\n') {
             out.push_str(text.line_end);
         }
     };
+    let declaration = control.declaration.as_ref();
+    let declaration = declaration.map_or(String::new(), |text| format!("\n{text}"));
     if levels.is_empty() {
         out.push_str(text.text);
         line_break(&mut out);
-        if let Some(declaration) = &control.declaration {
-            write!(out, "\n{declaration}").ok();
-        }
+        out.push_str(&declaration);
         return Ok(Ok(Spliced {
             text: with_line_ends(out, text.line_end),
             by_override: control.by_override,
         }));
     }
-    let Some(signature) = text.signature(&source.fragment) else {
-        return Err(Diagnostic::error(format!(
-            "`{}` is no function of {}",
-            source.fragment, source.name
-        )));
-    };
-    let original = names.take(&format!("original_{}", source.fragment));
-    let functions: Vec<String> = (1..=levels.len())
-        .map(|level| names.take(&format!("lod_{}_{}", in_words(level), source.fragment)))
+
+    let mut chosen = |name: &String| Chosen::new(body, name, levels.len(), &control, &mut names);
+    let vertex = vertex.map(&mut chosen).transpose()?;
+    let fragment = chosen(&source.fragment)?;
+    let stages = || vertex.iter().chain([&fragment]);
+    let demoted: Vec<(&Signature, &str)> = stages()
+        .map(|stage| (&stage.signature, &*stage.functions[0]))
         .collect();
-
-    out.push_str(&signature.demoted(text, &original));
+    out.push_str(&text.demoted(&demoted));
     line_break(&mut out);
-    if let Some(declaration) = &control.declaration {
-        write!(out, "\n{declaration}").ok();
-    }
-    let (head, arguments) = signature.with_parameters(text, |name| {
-        (name == control.root).then(|| names.take(name))
-    });
-    let arguments = arguments.join(", ");
-    write!(out, "\n{head} {{\n").ok();
-    let all: Vec<&String> = std::iter::once(&original).chain(&functions).collect();
-    for (function, next) in all.iter().zip(levels) {
-        let call = format!("{function}({arguments})");
-        let body = if signature.returns {
-            format!("return {call};")
-        } else {
-            format!("{call}; return;")
-        };
-        writeln!(
-            out,
-            "    if !({} >= {:?}) {{ {body} }}",
-            control.value, next.autolod
-        )
-        .ok();
-    }
-    let result = if signature.returns { "return " } else { "" };
-    writeln!(out, "    {result}{}({arguments});\n}}", all[levels.len()]).ok();
+    out.push_str(&declaration);
 
-    let mut extra: Vec<Item> = Vec::new();
+    let mut behind = Behind {
+        body,
+        names,
+        extra: Vec::new(),
+    };
+    let vertex = match &vertex {
+        None => VertexStage::of_nobody(levels),
+        Some(vertex) => {
+            let stages = (vertex, &fragment);
+            let made = VertexStage::new(stages, base, (levels, &of_vertex), varyings, &mut behind)?;
+            match made {
+                Ok(stage) => {
+                    let head = vertex
+                        .signature
+                        .with(text, &vertex.arguments, &[], stage.result());
+                    let chosen = branches(&control, levels, &stage.bodies);
+                    write!(out, "{}\n{head} {{\n{chosen}}}\n", stage.declaration).ok();
+                    stage
+                }
+                Err(hidden) => return Ok(Err(hidden)),
+            }
+        }
+    };
+    let bodies: Vec<String> = (0..=levels.len())
+        .map(|at| {
+            let further = match at {
+                0 => Vec::new(),
+                at => vertex.handed_to(at - 1),
+            };
+            let call = fragment.call(&fragment.functions[at], &further);
+            match (fragment.signature.result.is_some(), at == levels.len()) {
+                (true, _) => format!("return {call};"),
+                (false, true) => format!("{call};"),
+                (false, false) => format!("{call}; return;"),
+            }
+        })
+        .collect();
+    let further: Vec<&str> = vertex.further.iter().map(|one| &*one.declaration).collect();
+    let head = (fragment.signature).with(text, &fragment.arguments, &further, None);
+    let chosen = branches(&control, levels, &bodies);
+    write!(out, "\n{head} {{\n{chosen}}}\n").ok();
+
     let attribute = text
         .derivative_attribute()
         .map_or(String::new(), |a| format!("{a}\n"));
-    for (at, (level, function)) in levels.iter().zip(&functions).enumerate() {
-        let printed = level_function(body, level, function, &names)?;
-        let mut wanted = vec![function.clone()];
+    for (at, level) in levels.iter().enumerate() {
+        let name = &fragment.functions[at + 1];
+        let printed = fragment_function(body, level, name, &behind.names)?;
+        let function = match behind.take(&printed, name) {
+            Ok(function) => function,
+            Err(hidden) => return Ok(Err(hidden)),
+        };
+        let says = sentence(&level.says);
+        write!(out, "\n// Level {}. {says}\n", at + 1).ok();
+        if let Some(vertex) = &vertex.functions[at] {
+            write!(out, "{vertex}\n").ok();
+        }
+        write!(out, "{attribute}{function}").ok();
+    }
+    for item in &behind.extra {
+        write!(out, "\n{}", item.text).ok();
+    }
+    Ok(Ok(Spliced {
+        text: with_line_ends(out, text.line_end),
+        by_override: control.by_override,
+    }))
+}
+
+/// A stage whose entry point chooses.
+pub(crate) struct Chosen {
+    pub(crate) signature: Signature,
+    /// What the author's function is called now, and those of the levels.
+    pub(crate) functions: Vec<String>,
+    /// The entry point's parameters.
+    pub(crate) arguments: Vec<String>,
+}
+
+impl Chosen {
+    fn new(
+        body: &Body<'_>,
+        entry: &str,
+        levels: usize,
+        control: &Control,
+        names: &mut Names,
+    ) -> Result<Self> {
+        let Some(signature) = body.text.signature(entry) else {
+            return Err(Diagnostic::error(format!(
+                "`{entry}` is no function of {}",
+                body.source.name
+            )));
+        };
+        let original = names.take(&format!("original_{entry}"));
+        let of_levels = (1..=levels).map(|level| format!("lod_{}_{entry}", in_words(level)));
+        let of_levels: Vec<String> = of_levels.map(|wish| names.take(&wish)).collect();
+        let arguments = signature.names(&body.text).into_iter();
+        let arguments = arguments.map(|name| match name == control.root {
+            true => names.take(name),
+            false => name.to_owned(),
+        });
+        Ok(Self {
+            arguments: arguments.collect(),
+            signature,
+            functions: std::iter::once(original).chain(of_levels).collect(),
+        })
+    }
+
+    /// A call with the entry point's parameters, and with others behind them.
+    pub(crate) fn call(&self, function: &str, further: &[&str]) -> String {
+        let own = self.arguments.iter().map(String::as_str);
+        let all: Vec<&str> = own.chain(further.iter().copied()).collect();
+        format!("{function}({})", all.join(", "))
+    }
+}
+
+/// What comes behind the entry points.
+pub(crate) struct Behind<'b, 'a> {
+    pub(crate) body: &'b Body<'a>,
+    pub(crate) names: Names,
+    /// What the levels' functions need beside what the text declares.
+    extra: Vec<Item>,
+}
+
+impl Behind<'_, '_> {
+    /// The text of a printed function, with what it needs put behind all.
+    pub(crate) fn take(
+        &mut self,
+        printed: &Printed,
+        function: &str,
+    ) -> std::result::Result<String, Hidden> {
+        let mut text = String::new();
+        let mut wanted = vec![function.to_owned()];
         let mut done = BTreeSet::new();
-        let mut behind = Vec::new();
+        let mut needed = Vec::new();
         while let Some(name) = wanted.pop() {
             let Some(item) = printed.items.iter().find(|item| item.name == name) else {
                 continue;
             };
-            if body.declared.contains(&*name) || !done.insert(name.clone()) {
+            if self.body.declared.contains(&*name) || !done.insert(name.clone()) {
                 continue;
             }
-            if let Some(hidden) = body.hidden_from(item) {
-                return Ok(Err(hidden));
+            if let Some(hidden) = self.body.hidden_from(item) {
+                return Err(hidden);
             }
             wanted.extend(item.uses.iter().cloned());
             wanted.extend(
@@ -122,69 +230,49 @@ fn spliced(
                     .cloned(),
             );
             if name == *function {
-                let says = sentence(&level.says);
-                write!(
-                    out,
-                    "\n// Level {}. {says}\n{attribute}{}",
-                    at + 1,
-                    item.text
-                )
-                .ok();
-            } else if !extra.iter().any(|have| have.text == item.text) {
-                behind.push(item.clone());
+                text.clone_from(&item.text);
+            } else if !self.extra.iter().any(|have| have.text == item.text) {
+                needed.push(item.clone());
             }
         }
-        names.reserve(behind.iter().map(|item| item.name.as_str()));
-        behind.sort_by(|a, b| a.name.cmp(&b.name));
-        extra.extend(behind);
+        self.names
+            .reserve(needed.iter().map(|item| item.name.as_str()));
+        needed.sort_by(|a, b| a.name.cmp(&b.name));
+        self.extra.extend(needed);
+        Ok(text)
     }
-    for item in &extra {
-        write!(out, "\n{}", item.text).ok();
+
+    /// Takes a declaration away again, to be written elsewhere.
+    pub(crate) fn take_out(&mut self, name: &str) -> Option<Item> {
+        let at = self.extra.iter().position(|item| item.name == name)?;
+        Some(self.extra.remove(at))
     }
-    Ok(Ok(Spliced {
-        text: with_line_ends(out, text.line_end),
-        by_override: control.by_override,
-    }))
 }
 
-/// The function of a level, written with what it needs.
-fn level_function(
-    body: &Body<'_>,
-    level: &EmitLevel,
-    name: &str,
-    names: &Names,
-) -> Result<Printed> {
-    let mut module = renamed_module(body, level);
-    let Some(entry) = level.shader.index(Stage::Fragment) else {
-        let error = Diagnostic::error("internal error: a level has no fragment entry point");
-        return Err(flaw(error, body.source));
-    };
-    let mut function = module.entry_points.swap_remove(entry).function;
-    module.entry_points.clear();
-    for argument in &mut function.arguments {
-        argument.binding = None;
+/// The body of an entry point: what it does for the original, and for each level, by the thresholds.
+fn branches(control: &Control, levels: &[EmitLevel], bodies: &[String]) -> String {
+    let mut out = String::new();
+    for (at, level) in levels.iter().enumerate() {
+        let [body, next] = [&bodies[at], &bodies[at + 1]];
+        if body == next {
+            continue;
+        }
+        let test = format!("    if !({} >= {:?}) {{", control.value, level.autolod);
+        match body.contains('\n') {
+            true => writeln!(out, "{test}\n{}\n    }}", indented(body, "        ")),
+            false => writeln!(out, "{test} {body} }}"),
+        }
+        .ok();
     }
-    if let Some(result) = &mut function.result {
-        result.binding = None;
+    if let Some(last) = bodies.last() {
+        writeln!(out, "{}", indented(last, "    ")).ok();
     }
-    function.name = Some(name.to_owned());
-    let handle = module.functions.append(function, naga::Span::UNDEFINED);
-    let mut outside = Names::default();
-    outside.reserve(body.declared.iter().copied());
-    print(
-        &module,
-        &Wishes {
-            keep: &|wish| wish == name || body.declared.contains(wish),
-            taken: names,
-            outside: &outside,
-            value: &|owner, value| {
-                let is_own = owner == Owner::Function(handle);
-                is_own.then(|| value_name(&level.shader, Stage::Fragment, value))?
-            },
-            short_types: body.text.uses_short_types(),
-        },
-    )
-    .map_err(|reason| unwritable(body.source, &reason))
+    out
+}
+
+fn indented(text: &str, by: &str) -> String {
+    let lines: Vec<String> = text.lines().map(|line| format!("{by}{line}")).collect();
+    lines.join("\n")
 }
 
 /// The comment at the top: a function of the levels and the file's name alone.

@@ -28,7 +28,8 @@ pub struct Stages<'a> {
     pub vertex: (&'a Module, usize),
     /// The fragment stage.
     pub fragment: (&'a Module, usize),
-    /// What the override constant `autoLOD` is, where the fragment stage's module declares it; unset, its default.
+    /// What the override constant `autoLOD` is, which the fragment stage's module declares then, and the vertex stage's may;
+    /// unset, its default.
     pub auto_lod: Option<f64>,
 }
 

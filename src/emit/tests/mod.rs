@@ -1,7 +1,10 @@
 //! Emission as a whole: small shaders for what is easily got wrong, and every shader under `testdata/`.
 
+mod vertex;
+
 use super::*;
 use crate::fixtures;
+use lodc_passes::shader::Stage;
 
 /// The normal form of a source.
 fn base(source: &Source) -> Shader {
@@ -33,8 +36,8 @@ fn output(form: Form, target: Target) -> Output {
 fn emitted(text: &str, form: Form) -> String {
     let source = source(text);
     let levels = [level(&source, 0.85), level(&source, 2.1)];
-    let files =
-        emit(&source, &levels, output(form, Target::Wgsl)).unwrap_or_else(|e| panic!("{e}"));
+    let files = emit(&source, &base(&source), &levels, output(form, Target::Wgsl))
+        .unwrap_or_else(|e| panic!("{e}"));
     let (name, bytes) = files.into_iter().next_back().expect("there is a file");
     let expected = if form == Form::Files {
         "test.lod2.wgsl"
@@ -122,8 +125,14 @@ fn the_header_lists_the_levels() {
 #[test]
 fn another_name_is_that_of_the_lock_too() {
     let source = source(SMALL);
-    let files = emit_as(&source, &[level(&source, 1.0)], Output::default(), "other")
-        .unwrap_or_else(|e| panic!("{e}"));
+    let files = emit_as(
+        &source,
+        &base(&source),
+        &[level(&source, 1.0)],
+        Output::default(),
+        "other",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(files[0].0, Path::new("other.lod.wgsl"));
     let text = String::from_utf8_lossy(&files[0].1);
     assert!(
@@ -139,6 +148,7 @@ fn level_0_in_files_is_the_source() {
     let source = source(SMALL);
     let files = emit(
         &source,
+        &base(&source),
         &[level(&source, 1.0)],
         output(Form::Files, Target::Wgsl),
     )
@@ -241,6 +251,7 @@ fn an_autolod_of_the_authors_is_used() {
     assert!(
         emit(
             &source,
+            &base(&source),
             &[level(&source, 1.0)],
             output(Form::Override, Target::Spirv)
         )
@@ -252,8 +263,13 @@ fn an_autolod_of_the_authors_is_used() {
 fn an_autolod_that_no_host_sets_is_an_error_at_its_place() {
     let text = "const autoLOD = 1.0;\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(autoLOD); }";
     let source = source(text);
-    let error =
-        emit(&source, &[level(&source, 1.0)], Output::default()).expect_err("it cannot be used");
+    let error = emit(
+        &source,
+        &base(&source),
+        &[level(&source, 1.0)],
+        Output::default(),
+    )
+    .expect_err("it cannot be used");
     assert_eq!(&text[error.labels[0].0.clone()], "autoLOD");
     assert!(!error.notes.is_empty());
 }
@@ -277,11 +293,11 @@ fn entry_points_of_every_shape_are_called() {
     let mut source = source(
         "@fragment fn fs_main(@location(0) v: f32) -> @location(0) vec4f { return vec4f(v); }",
     );
-    let mut level = level(&source, 0.85);
+    let (base, mut level) = (base(&source), level(&source, 0.85));
     level.says.clear();
     source.text = "@fragment fn fs_main(@builtin(position) p: vec4f) { if p.x < 1.0 { discard; } }"
         .to_owned();
-    let text = splice::splice(&source, &[level], Form::Override, "test")
+    let text = splice::splice(&source, &base, &[level], Form::Override, "test")
         .unwrap_or_else(|e| panic!("{e}"))
         .text;
     has(
@@ -338,8 +354,13 @@ fn a_name_that_the_host_knows_cannot_change() {
         }";
     let source = source(text);
     for form in [Form::Override, Form::Files] {
-        let error = emit(&source, &[level(&source, 1.0)], output(form, Target::Wgsl))
-            .expect_err("the level needs `select`");
+        let error = emit(
+            &source,
+            &base(&source),
+            &[level(&source, 1.0)],
+            output(form, Target::Wgsl),
+        )
+        .expect_err("the level needs `select`");
         assert_eq!(&text[error.labels[0].0.clone()], "select");
         assert!(!error.notes.is_empty());
     }
@@ -392,7 +413,8 @@ fn line_ends_are_the_authors() {
 #[test]
 fn without_levels_the_original_is_written() {
     let source = source(SMALL);
-    let files = emit(&source, &[], Output::default()).unwrap_or_else(|e| panic!("{e}"));
+    let files =
+        emit(&source, &base(&source), &[], Output::default()).unwrap_or_else(|e| panic!("{e}"));
     let text = String::from_utf8_lossy(&files[0].1).into_owned();
     has(&text, SMALL);
     // A host that sets the constant finds it.
@@ -411,7 +433,7 @@ fn thresholds_rise() {
     ] {
         let levels = thresholds.map(|autolod| level(&source, autolod));
         assert!(
-            emit(&source, &levels, Output::default()).is_err(),
+            emit(&source, &base(&source), &levels, Output::default()).is_err(),
             "{thresholds:?}"
         );
     }
@@ -427,8 +449,13 @@ fn every_language_is_written_where_it_can_carry_the_form() {
         (Target::Hlsl, &["hlsl"]),
         (Target::Msl, &["metal"]),
     ] {
-        let error =
-            emit(&source, &levels, output(Form::Override, target)).expect_err("no language has it");
+        let error = emit(
+            &source,
+            &base(&source),
+            &levels,
+            output(Form::Override, target),
+        )
+        .expect_err("no language has it");
         assert!(error.message.contains(target.name()), "{error}");
         assert!(
             error
@@ -438,8 +465,13 @@ fn every_language_is_written_where_it_can_carry_the_form() {
             "{error}"
         );
 
-        let files =
-            emit(&source, &levels, output(Form::Uniform, target)).unwrap_or_else(|e| panic!("{e}"));
+        let files = emit(
+            &source,
+            &base(&source),
+            &levels,
+            output(Form::Uniform, target),
+        )
+        .unwrap_or_else(|e| panic!("{e}"));
         let names: Vec<_> = files
             .iter()
             .map(|(name, _)| name.to_string_lossy().into_owned())
@@ -447,8 +479,13 @@ fn every_language_is_written_where_it_can_carry_the_form() {
         let expected: Vec<_> = extensions.iter().map(|e| format!("test.lod.{e}")).collect();
         assert_eq!(names, expected);
 
-        let files =
-            emit(&source, &levels, output(Form::Files, target)).unwrap_or_else(|e| panic!("{e}"));
+        let files = emit(
+            &source,
+            &base(&source),
+            &levels,
+            output(Form::Files, target),
+        )
+        .unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(files.len(), 2 * extensions.len());
         assert!(files.iter().all(|(_, bytes)| !bytes.is_empty()));
     }
@@ -461,6 +498,7 @@ fn a_constant_without_a_default_is_named_where_it_cannot_be_carried() {
     );
     let error = emit(
         &source,
+        &base(&source),
         &[level(&source, 1.0)],
         output(Form::Uniform, Target::Hlsl),
     )
@@ -481,9 +519,9 @@ fn every_shader_is_emitted_in_every_form() {
         let levels = [first, second];
         for form in [Form::Override, Form::Uniform, Form::Files] {
             // What is emitted is read back before it is returned.
-            let first = emit(&source, &levels, output(form, Target::Wgsl))
+            let first = emit(&source, &base(&source), &levels, output(form, Target::Wgsl))
                 .unwrap_or_else(|e| panic!("{e}"));
-            let second = emit(&source, &levels, output(form, Target::Wgsl))
+            let second = emit(&source, &base(&source), &levels, output(form, Target::Wgsl))
                 .unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(first, second);
             for (name, bytes) in first {
@@ -502,8 +540,13 @@ fn every_shader_is_emitted_in_every_form() {
             .iter()
             .any(|(_, o)| o.name.as_deref() == Some("autoLOD"))
         {
-            emit(&source, &levels, output(Form::Uniform, Target::Spirv))
-                .unwrap_or_else(|e| panic!("{e}"));
+            emit(
+                &source,
+                &base(&source),
+                &levels,
+                output(Form::Uniform, Target::Spirv),
+            )
+            .unwrap_or_else(|e| panic!("{e}"));
         }
         seen += 1;
     }
@@ -578,14 +621,20 @@ mod meaning {
             let variant = outputs(levels[0].shader.module(), name, bindings);
             assert!(variant.is_some(), "{}", path.display());
 
-            let files = emit(&source, &levels, output(Form::Files, Target::Wgsl));
+            let files = emit(
+                &source,
+                &base(&source),
+                &levels,
+                output(Form::Files, Target::Wgsl),
+            );
             let files = files.unwrap_or_else(|e| panic!("{e}"));
             let text = String::from_utf8_lossy(&files[1].1);
             let alone = read_back(&text, &source).unwrap_or_else(|e| panic!("{e}"));
             let got = outputs(&alone.module, name, bindings);
             assert!(got == variant, "{} alone", path.display());
 
-            let files = emit(&source, &levels, Output::default()).unwrap_or_else(|e| panic!("{e}"));
+            let files = emit(&source, &base(&source), &levels, Output::default())
+                .unwrap_or_else(|e| panic!("{e}"));
             let text = String::from_utf8_lossy(&files[0].1);
             if !text.contains("override autoLOD") {
                 return;

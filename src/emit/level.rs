@@ -1,0 +1,299 @@
+//! A level's stages as ordinary functions, which the entry points of the spliced text call.
+
+use super::body::{Body, renamed_module, unwritable};
+use super::print::{Owner, Printed, Wishes, print, value_name};
+use super::varyings::{Varyings, location, outputs, same_place};
+use super::{EmitLevel, flaw};
+use crate::front::identifiers::Names;
+use crate::{Diagnostic, Result};
+use lodc_passes::shader::Stage;
+use lodc_passes::{Shader, operands};
+use naga::proc::Layouter;
+use naga::{
+    Binding, Block, Expression, Function, FunctionResult, Handle, Literal, Module, Scalar, Span,
+    Statement, StructMember, Type, TypeInner,
+};
+
+/// The fragment stage of a level, written with what it needs.
+pub(crate) fn fragment_function(
+    body: &Body<'_>,
+    level: &EmitLevel,
+    name: &str,
+    names: &Names,
+) -> Result<Printed> {
+    let (mut module, mut function) = stage_of(body, level, Stage::Fragment)?;
+    if let Some(result) = &mut function.result {
+        result.binding = None;
+    }
+    written(
+        body,
+        level,
+        (&mut module, function, Stage::Fragment),
+        (name, None),
+        names,
+    )
+}
+
+/// What the vertex stage of a shader with several levels returns: a struct of what the author's does and of what levels
+/// hand over beside it.
+pub(crate) struct HandedOver<'a> {
+    /// The struct's name.
+    pub(crate) name: &'a str,
+    /// The shader before any level.
+    pub(crate) base: &'a Shader,
+    /// What levels hand over.
+    pub(crate) varyings: &'a Varyings,
+}
+
+/// The vertex stage of a level, the one at this place in the list, written with what it needs: with the struct that it
+/// returns, or a bare position without one.
+pub(crate) fn vertex_function(
+    body: &Body<'_>,
+    (at, level): (usize, &EmitLevel),
+    name: &str,
+    handed_over: Option<&HandedOver<'_>>,
+    names: &Names,
+) -> Result<Printed> {
+    let (mut module, mut function) = stage_of(body, level, Stage::Vertex)?;
+    if let Some(handed_over) = handed_over {
+        let own = &handed_over.varyings.of_levels[at];
+        if handed_over
+            .returned_by(&mut module, &mut function, own)
+            .is_none()
+        {
+            let error = Diagnostic::error("internal error: a level's vertex stage returns nothing");
+            return Err(flaw(error, body.source));
+        }
+    } else if let Some(result) = &mut function.result {
+        result.binding = None;
+    }
+    let stage = (&mut module, function, Stage::Vertex);
+    let returned = handed_over.map(|handed_over| handed_over.name);
+    written(body, level, stage, (name, returned), names)
+}
+
+/// A level's module without its entry points, and the function of one of them, without the attributes of its arguments.
+fn stage_of(body: &Body<'_>, level: &EmitLevel, stage: Stage) -> Result<(Module, Function)> {
+    let mut module = renamed_module(body, level);
+    let Some(entry) = level.shader.index(stage) else {
+        let stage = format!("{stage:?}").to_lowercase();
+        let error = format!("internal error: a level has no {stage} entry point");
+        return Err(flaw(Diagnostic::error(error), body.source));
+    };
+    let mut function = module.entry_points.swap_remove(entry).function;
+    module.entry_points.clear();
+    for argument in &mut function.arguments {
+        argument.binding = None;
+    }
+    Ok((module, function))
+}
+
+/// Writes a level's function under a name, and the struct that it returns under another.
+fn written(
+    body: &Body<'_>,
+    level: &EmitLevel,
+    (module, mut function, stage): (&mut Module, Function, Stage),
+    (name, returned): (&str, Option<&str>),
+    names: &Names,
+) -> Result<Printed> {
+    let values = level
+        .shader
+        .function(stage)
+        .map_or(0, |function| function.expressions.len());
+    function.name = Some(name.to_owned());
+    let handle = module.functions.append(function, Span::UNDEFINED);
+    let mut outside = Names::default();
+    outside.reserve(body.declared.iter().copied());
+    print(
+        module,
+        &Wishes {
+            keep: &|wish| wish == name || Some(wish) == returned || body.declared.contains(wish),
+            taken: names,
+            outside: &outside,
+            value: &|owner, value| {
+                let is_levels = owner == Owner::Function(handle) && value.index() < values;
+                is_levels.then(|| value_name(&level.shader, stage, value))?
+            },
+            short_types: body.text.uses_short_types(),
+        },
+    )
+    .map_err(|reason| unwritable(body.source, &reason))
+}
+
+impl HandedOver<'_> {
+    /// Makes a vertex function of a level return the struct: what it does not return itself is 0. `None` when it returns
+    /// nothing.
+    fn returned_by(
+        &self,
+        module: &mut Module,
+        function: &mut Function,
+        own: &[(u32, usize)],
+    ) -> Option<()> {
+        let base = self.base.function(Stage::Vertex)?;
+        let of_base = outputs(self.base.module(), base);
+        let of_level = outputs(module, function);
+        // Where the level returns each member, if it does.
+        let mut members = Vec::new();
+        for output in of_base {
+            let found = of_level
+                .iter()
+                .position(|of_level| same_place(&of_level.binding, &output.binding));
+            let ty = match found {
+                Some(at) => of_level[at].ty,
+                None => self.insert(module, &self.base.module().types[output.ty].inner),
+            };
+            let name = output.member.unwrap_or_else(|| "position".to_owned());
+            members.push((name, output.binding, ty, found));
+        }
+        for (place, varying) in self.varyings.shared.iter().enumerate() {
+            let own = own.iter().find(|(_, shared)| *shared == place);
+            let found = own.and_then(|(own, _)| {
+                of_level
+                    .iter()
+                    .position(|of_level| location(&of_level.binding) == Some(*own))
+            });
+            let ty = self.insert(module, &varying.ty);
+            members.push((varying.name.clone(), varying.binding.clone(), ty, found));
+        }
+
+        let Some(Statement::Return { value: Some(value) }) = function.body.last() else {
+            return None;
+        };
+        let value = *value;
+        let last = function.body.len() - 1;
+        function.body.cull(last..);
+        let is_struct = of_level.iter().all(|output| output.member.is_some());
+        let known = match (&function.expressions[value], is_struct) {
+            (Expression::Compose { components, .. }, true) => {
+                let components = components.clone();
+                take_away(function, value);
+                Some(components)
+            }
+            (_, true) => None,
+            (_, false) => Some(vec![value]),
+        };
+        let mut components = Vec::new();
+        for (_, _, ty, found) in &members {
+            let expression = match (found, &known) {
+                (Some(at), Some(known)) => {
+                    components.push(*known.get(*at)?);
+                    continue;
+                }
+                (Some(at), None) => Expression::AccessIndex {
+                    base: value,
+                    index: *at as u32,
+                },
+                (None, _) if module.types[*ty].inner == TypeInner::Scalar(Scalar::F32) => {
+                    Expression::Literal(Literal::F32(0.0))
+                }
+                (None, _) => Expression::ZeroValue(*ty),
+            };
+            components.push(add(function, expression));
+        }
+        let members = members.into_iter();
+        let members = members.map(|(name, binding, ty, _)| (name, binding, ty));
+        let ty = self.insert_struct(module, members)?;
+        let returned = add(function, Expression::Compose { ty, components });
+        let statement = Statement::Return {
+            value: Some(returned),
+        };
+        function.body.push(statement, Span::UNDEFINED);
+        function.result = Some(FunctionResult { ty, binding: None });
+        Some(())
+    }
+
+    fn insert(&self, module: &mut Module, inner: &TypeInner) -> Handle<Type> {
+        let ty = Type {
+            name: None,
+            inner: inner.clone(),
+        };
+        module.types.insert(ty, Span::UNDEFINED)
+    }
+
+    /// The struct with its members, each with its place in memory. `None` when a member's type has none.
+    fn insert_struct(
+        &self,
+        module: &mut Module,
+        members: impl Iterator<Item = (String, Binding, Handle<Type>)>,
+    ) -> Option<Handle<Type>> {
+        let mut layouter = Layouter::default();
+        layouter.update(module.to_ctx()).ok()?;
+        let mut offset = 0;
+        let mut widest = naga::proc::Alignment::ONE;
+        let members: Vec<StructMember> = members
+            .map(|(name, binding, ty)| {
+                let layout = layouter[ty];
+                let start = layout.alignment.round_up(offset);
+                offset = start + layout.size;
+                widest = widest.max(layout.alignment);
+                StructMember {
+                    name: Some(name),
+                    ty,
+                    binding: Some(binding),
+                    offset: start,
+                }
+            })
+            .collect();
+        let ty = Type {
+            name: Some(self.name.to_owned()),
+            inner: TypeInner::Struct {
+                members,
+                span: widest.round_up(offset),
+            },
+        };
+        Some(module.types.insert(ty, Span::UNDEFINED))
+    }
+}
+
+/// Puts a value at the end of a function.
+fn add(function: &mut Function, expression: Expression) -> Handle<Expression> {
+    let is_emitted = !expression.needs_pre_emit();
+    let value = function.expressions.append(expression, Span::UNDEFINED);
+    if is_emitted {
+        let range = naga::Range::new_from_bounds(value, value);
+        function.body.push(Statement::Emit(range), Span::UNDEFINED);
+    }
+    value
+}
+
+/// Takes the use away that a value of the function's outermost block makes of others, where nothing uses the value: what
+/// is used once is written where it is used.
+fn take_away(function: &mut Function, value: Handle<Expression>) {
+    let mut is_used = false;
+    let mut see = |operand| is_used |= operand == value;
+    for (_, expression) in function.expressions.iter() {
+        operands::each(expression, &mut see);
+    }
+    operands::walk(&function.body, &mut |statement| {
+        operands::each_of_statement(statement, &mut see);
+    });
+    if is_used {
+        return;
+    }
+    let mut body = Block::with_capacity(function.body.len() + 1);
+    let mut is_found = false;
+    for (statement, span) in function.body.span_iter() {
+        let range = match statement {
+            Statement::Emit(range) if range.clone().any(|one| one == value) => range.clone(),
+            other => {
+                body.push(other.clone(), *span);
+                continue;
+            }
+        };
+        is_found = true;
+        let [before, behind]: [Vec<Handle<Expression>>; 2] = [
+            range.clone().filter(|one| *one < value).collect(),
+            range.filter(|one| *one > value).collect(),
+        ];
+        for part in [before, behind] {
+            if let (Some(first), Some(last)) = (part.first(), part.last()) {
+                let range = naga::Range::new_from_bounds(*first, *last);
+                body.push(Statement::Emit(range), *span);
+            }
+        }
+    }
+    if is_found {
+        function.body = body;
+        function.expressions[value] = Expression::Literal(Literal::Bool(false));
+    }
+}
