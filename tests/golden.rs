@@ -1,7 +1,7 @@
 //! Golden files: what each pass makes of each of its fixtures, as full-context diffs.
 //!
 //! Beside `testdata/passes/<pass>/<case>.wgsl` lies `<case>.diff`: for every candidate in order, the
-//! fragment stage before and after, as it would be emitted, of a pass that changes both stages both; for what the pass
+//! fragment stage before and after, as it would be emitted, of a pass that changes others too all; for what the pass
 //! declines, the reason.
 //! A fixture may open with comments that are read here:
 //!
@@ -66,8 +66,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
-    let both = pass.name() == "vertex-motion";
-    let stages = |variant: &Shader| stages((&source, &shader), variant, both);
+    let all = ["vertex-motion", "to-parameter"].contains(&pass.name());
+    let stages = |variant: &Shader| stages((&source, &shader), variant, all);
     let before = stages(&shader);
     let mut golden = String::new();
     let mut offered = 0;
@@ -95,8 +95,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     (golden.trim_end().to_owned() + "\n", offered)
 }
 
-/// The text of a variant's fragment stage, or of both with what they declare, as emitted.
-fn stages((source, base): (&Source, &Shader), shader: &Shader, both: bool) -> String {
+/// The text of a variant's fragment stage, or of all with what they declare, as emitted.
+fn stages((source, base): (&Source, &Shader), shader: &Shader, all: bool) -> String {
     let level = EmitLevel {
         autolod: 1.0,
         shader: shader.clone(),
@@ -113,7 +113,7 @@ fn stages((source, base): (&Source, &Shader), shader: &Shader, both: bool) -> St
         .unwrap_or_else(|e| panic!("{}: {e}", source.name));
     let (_, bytes) = files.last().expect("one file a level");
     let text = String::from_utf8(bytes.clone()).expect("WGSL is text");
-    let start = match both {
+    let start = match all {
         true => text.find("\n\n").map(|header| header + 2),
         false => text.find("@fragment"),
     };

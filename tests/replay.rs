@@ -198,11 +198,14 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
             .unwrap_or_else(|error| panic!("{}: {error}\n{toml}", subject.name));
         assert_eq!(replayed.fingerprint(), shader.fingerprint(), "{toml}");
         let text = wgsl(&shader);
-        let point = |stage| shader.entry_point(stage).map(|point| point.name.as_str());
-        let fragment = point(Stage::Fragment).expect("there always is one");
-        let again =
-            lodc_passes::normalize(shader.module(), point(Stage::Vertex), fragment, 100_000)
-                .expect("edits make shaders smaller");
+        let stages = [Stage::Vertex, Stage::Fragment, Stage::Parameter];
+        let entries = stages.iter().filter_map(|stage| {
+            let point = shader.entry_point(*stage)?;
+            Some((*stage, point.name.as_str()))
+        });
+        let entries: Vec<_> = entries.collect();
+        let again = lodc_passes::normalize_stages(shader.module(), &entries, 100_000)
+            .expect("edits make shaders smaller");
         assert_eq!(again.fingerprint(), shader.fingerprint(), "{text}\n{toml}");
         assert_eq!(wgsl(&replayed), text, "{toml}");
         if let Err(error) = naga::front::wgsl::parse_str(&text) {

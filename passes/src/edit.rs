@@ -10,6 +10,7 @@ use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
 use crate::normalize::{names, split};
 use crate::operands::{self, User};
+use crate::parameters;
 use crate::semantics::{Constant, Shape};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
@@ -46,6 +47,8 @@ pub struct Edit<'a> {
     function: Cow<'a, Function>,
     /// What it returns beside what it returned.
     outputs: Vec<(Output, Handle<Expression>)>,
+    /// What it stores in the parameter block beside what it stored: names, types and values.
+    parameters: Vec<(String, Handle<Type>, Handle<Expression>)>,
     /// What is done before it returns.
     before_return: Block,
     /// The old values, and behind them those that were added.
@@ -71,6 +74,7 @@ impl<'a> Edit<'a> {
             module: without(&shader.module, entry),
             function: Cow::Borrowed(function),
             outputs: Vec::new(),
+            parameters: Vec::new(),
             before_return: Block::new(),
             expressions: function.expressions.clone(),
             added: Vec::new(),
@@ -118,6 +122,16 @@ impl<'a> Edit<'a> {
     /// From now on the function returns a value, an old or an added one, behind all that it returned.
     pub(crate) fn add_output(&mut self, output: Output, value: Handle<Expression>) {
         self.outputs.push((output, value));
+    }
+
+    /// From now on the parameter stage stores a value, an old or an added one, behind all that it stored.
+    pub(crate) fn add_parameter(
+        &mut self,
+        name: String,
+        ty: Handle<Type>,
+        value: Handle<Expression>,
+    ) {
+        self.parameters.push((name, ty, value));
     }
 
     /// Has statements done before the function returns, behind those that were given before. Values that they compute are
@@ -201,6 +215,18 @@ impl<'a> Edit<'a> {
         }
     }
 
+    /// A new constant: of one number a float, of more a vector of them.
+    pub(crate) fn add_numbers(&mut self, path: &str, numbers: &[f32]) -> Handle<Expression> {
+        let literals: Vec<Literal> = numbers.iter().copied().map(Literal::F32).collect();
+        let size = match literals[..] {
+            [_, _] => VectorSize::Bi,
+            [_, _, _] => VectorSize::Tri,
+            [_, _, _, _] => VectorSize::Quad,
+            _ => return self.add(path, Expression::Literal(literals[0])),
+        };
+        self.constant_vector(path, size, Scalar::F32, &literals)
+    }
+
     fn constant_vector(
         &mut self,
         path: &str,
@@ -257,7 +283,9 @@ impl<'a> Edit<'a> {
                 }
             }
         }
-        if !self.outputs.is_empty() || !self.before_return.is_empty() {
+        if self.stage == Stage::Parameter {
+            self.change_stored(body.to_mut());
+        } else if !self.outputs.is_empty() || !self.before_return.is_empty() {
             self.change_end(body.to_mut());
         }
         let old = &*self.function;
@@ -321,8 +349,9 @@ impl<'a> Edit<'a> {
         self.module.entry_points[self.entry].function = function;
         let shader = Shader::changed(self.module, ids, self.shader.authors);
         match self.stage {
-            Stage::Fragment => interface::settle(shader),
-            Stage::Vertex => shader,
+            Stage::Fragment => parameters::settle(interface::settle(shader)),
+            Stage::Vertex => parameters::settle(shader),
+            Stage::Parameter => shader,
         }
     }
 
@@ -371,6 +400,33 @@ impl<'a> Edit<'a> {
         if let Some(Statement::Return { value }) = body.iter_mut().last() {
             *value = returned;
         }
+    }
+
+    /// Puts in place what is done before the parameters are stored, and what is stored then.
+    fn change_stored(&mut self, body: &mut Block) {
+        let before = std::mem::take(&mut self.before_return);
+        let added = std::mem::take(&mut self.parameters);
+        if before.is_empty() && added.is_empty() {
+            return;
+        }
+        let stored = parameters::stored(body, &self.expressions);
+        let (at, storage, mut components) = match stored {
+            Some((at, storage, components)) => (at, Some(storage), components.to_vec()),
+            None => (body.len() - 1, None, Vec::new()),
+        };
+        let mut members = Vec::new();
+        for (name, ty, value) in added {
+            members.push((name, ty));
+            components.push(value);
+        }
+        let (storage, ty) = parameters::extended(&mut self.module, storage, members);
+        let path = format!("{}.stored", self.entry_name());
+        let pointer = self.add(path.clone(), Expression::GlobalVariable(storage));
+        let value = self.add(path, Expression::Compose { ty, components });
+        let mut end = before;
+        end.push(Statement::Store { pointer, value }, Span::UNDEFINED);
+        let last = body.len() - 1;
+        body.splice(at..last, end);
     }
 
     fn entry_name(&self) -> &str {
@@ -485,7 +541,7 @@ fn nth<'b>(block: &'b mut Block, number: &mut usize) -> Option<&'b mut Statement
 }
 
 /// Everything of a module but the function of one of its entry points.
-fn without(module: &Module, entry: usize) -> Module {
+pub(crate) fn without(module: &Module, entry: usize) -> Module {
     let entry_points = module.entry_points.iter().enumerate().map(|(at, point)| {
         let function = match at == entry {
             true => Function::default(),

@@ -138,7 +138,7 @@ fn structure(
 }
 
 /// Size and alignment of what may be handed over, in bytes.
-fn layout(inner: &TypeInner) -> (u32, u32) {
+pub(crate) fn layout(inner: &TypeInner) -> (u32, u32) {
     match *inner {
         TypeInner::Vector { size, scalar } => {
             let count = size as u32;

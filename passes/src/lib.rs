@@ -18,6 +18,7 @@ mod live;
 pub mod normalize;
 pub mod op_removal;
 pub mod operands;
+pub mod parameters;
 mod places;
 pub mod rate;
 pub mod recipe;
@@ -26,12 +27,13 @@ pub mod shader;
 mod slice;
 pub mod specialize;
 pub mod texture_removal;
+pub mod to_parameter;
 pub mod vertex_motion;
 
 pub use cost::Work;
 pub use edit::{Edit, New};
 pub use facts::Facts;
-pub use normalize::{NormalizeError, normalize};
+pub use normalize::{NormalizeError, normalize, normalize_stages};
 pub use rate::{Rate, Rates};
 pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
@@ -46,4 +48,4 @@ pub static PASSES: &[&dyn Pass] = &[
 ];
 
 /// Passes that are not searched yet: what they make cannot be emitted.
-pub static UNSEARCHED: &[&dyn Pass] = &[&vertex_motion::VertexMotion];
+pub static UNSEARCHED: &[&dyn Pass] = &[&vertex_motion::VertexMotion, &to_parameter::ToParameter];

@@ -240,7 +240,7 @@ impl Rates {
     pub fn of(shader: &Shader, stage: Stage) -> Option<Self> {
         let flow = Flow::new(shader, stage)?;
         let handed = match stage {
-            Stage::Vertex => None,
+            Stage::Vertex | Stage::Parameter => None,
             Stage::Fragment => Self::of(shader, Stage::Vertex),
         };
         let analysis = Analysis {
@@ -264,6 +264,7 @@ impl Rates {
         match self.stage {
             Stage::Vertex => Rate::Vertex,
             Stage::Fragment => Rate::Fragment,
+            Stage::Parameter => Rate::Draw,
         }
     }
 

@@ -89,10 +89,14 @@ impl Candidate {
 impl fmt::Display for Candidate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {} ", self.pass, self.site.path())?;
-        match self.choice.split_once('#') {
-            // Hashes are for finding, not for reading.
-            Some((choice, _)) => f.write_str(choice)?,
-            None => f.write_str(&self.choice)?,
+        // Hashes are for finding, not for reading.
+        for (i, word) in self.choice.split(' ').enumerate() {
+            let sep = if i == 0 { "" } else { " " };
+            write!(
+                f,
+                "{sep}{}",
+                word.split_once('#').map_or(word, |(word, _)| word)
+            )?;
         }
         let mut sep = " = ";
         for number in self.numbers() {

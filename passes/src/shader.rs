@@ -22,6 +22,19 @@ pub enum Stage {
     Vertex,
     /// The fragment entry point.
     Fragment,
+    /// The compute entry point that fills the parameter block, once a draw. Only variants have it; see
+    /// [`crate::parameters`].
+    Parameter,
+}
+
+impl From<Stage> for ShaderStage {
+    fn from(stage: Stage) -> Self {
+        match stage {
+            Stage::Vertex => Self::Vertex,
+            Stage::Fragment => Self::Fragment,
+            Stage::Parameter => Self::Compute,
+        }
+    }
 }
 
 /// The stable name of a value: a path from the nearest named value, such as
@@ -148,7 +161,8 @@ impl Shader {
         }
     }
 
-    /// The module. It holds a fragment entry point, a vertex entry point or not, and no functions.
+    /// The module. It holds a fragment entry point, a vertex entry point or not, in a variant one that fills the parameter
+    /// block, and no functions.
     pub fn module(&self) -> &Module {
         &self.module
     }
@@ -165,10 +179,7 @@ impl Shader {
 
     /// The place of a stage's entry point in `module().entry_points`.
     pub fn index(&self, stage: Stage) -> Option<usize> {
-        let wanted = match stage {
-            Stage::Vertex => ShaderStage::Vertex,
-            Stage::Fragment => ShaderStage::Fragment,
-        };
+        let wanted = ShaderStage::from(stage);
         self.module
             .entry_points
             .iter()
@@ -254,9 +265,9 @@ impl Shader {
         })
     }
 
-    /// The values of both stages, with their ids.
+    /// The values of all stages, with their ids.
     fn values(&self) -> impl Iterator<Item = (Stage, Handle<Expression>, &ValueId)> {
-        [Stage::Vertex, Stage::Fragment]
+        [Stage::Vertex, Stage::Fragment, Stage::Parameter]
             .into_iter()
             .filter_map(|stage| Some((stage, self.index(stage)?)))
             .flat_map(|(stage, entry)| {

@@ -19,7 +19,9 @@ pub(crate) struct Slice<'a> {
     value: Value,
     /// For each value of the function, whether it is in it.
     values: Vec<bool>,
-    /// The same for each local variable.
+    /// For each value, whether it stands for all that leads to it.
+    ends: Vec<bool>,
+    /// For each local variable, whether it is in it.
     locals: Vec<bool>,
     /// What is around the value, outermost first.
     around: Vec<Around>,
@@ -47,10 +49,17 @@ pub(crate) trait Source {
 impl<'a> Slice<'a> {
     /// The slice of a value.
     pub(crate) fn of(flow: &'a Flow<'a>, value: Value) -> Self {
+        Self::up_to(flow, value, vec![false; flow.function.expressions.len()])
+    }
+
+    /// The slice of a value without what leads to some values in it, which a copy has other values for; there is a truth
+    /// for each value of the function.
+    pub(crate) fn up_to(flow: &'a Flow<'a>, value: Value, ends: Vec<bool>) -> Self {
         let function = flow.function;
         let mut slice = Self {
             flow,
             value,
+            ends,
             values: vec![false; function.expressions.len()],
             locals: vec![false; function.local_variables.len()],
             around: Vec::new(),
@@ -95,7 +104,7 @@ impl<'a> Slice<'a> {
                 continue;
             }
             // An input stands for itself, not for the structure that it is a member of.
-            if self.flow.input(value).is_some() {
+            if self.flow.input(value).is_some() || self.ends[value.index()] {
                 continue;
             }
             let expression = &function.expressions[value];

@@ -14,7 +14,7 @@ mod returns;
 pub(crate) mod split;
 
 use crate::fingerprint::{self, Declared};
-use crate::{Shader, live};
+use crate::{Shader, Stage, live};
 use forward::{Changes, Origin};
 use naga::{Expression, Function, Module, ShaderStage, Span};
 use names::Tag;
@@ -58,21 +58,31 @@ pub fn normalize(
     fragment: &str,
     limit: usize,
 ) -> Result<Shader, NormalizeError> {
+    let vertex = vertex.map(|name| (Stage::Vertex, name));
+    let entries: Vec<_> = vertex
+        .into_iter()
+        .chain([(Stage::Fragment, fragment)])
+        .collect();
+    normalize_stages(module, &entries, limit)
+}
+
+/// The same for the entry points of any stages, a fragment entry point among them.
+///
+/// # Errors
+/// As [`normalize`].
+pub fn normalize_stages(
+    module: &Module,
+    entries: &[(Stage, &str)],
+    limit: usize,
+) -> Result<Shader, NormalizeError> {
     let mut module = module.clone();
-    let wanted = |stage, name: &str| match stage {
-        ShaderStage::Vertex => vertex == Some(name),
-        ShaderStage::Fragment => fragment == name,
-        _ => false,
-    };
-    module.entry_points.retain(|e| wanted(e.stage, &e.name));
-    for (stage, name) in [
-        (ShaderStage::Vertex, vertex),
-        (ShaderStage::Fragment, Some(fragment)),
-    ] {
-        let there = module.entry_points.iter().any(|e| e.stage == stage);
-        if let Some(name) = name
-            && !there
-        {
+    module.entry_points.retain(|point| {
+        let mut entries = entries.iter();
+        entries.any(|(stage, name)| point.stage == ShaderStage::from(*stage) && point.name == *name)
+    });
+    for (stage, name) in entries {
+        let mut points = module.entry_points.iter();
+        if !points.any(|point| point.stage == ShaderStage::from(*stage)) {
             let stage = format!("{stage:?}").to_lowercase();
             return Err(NormalizeError {
                 message: format!("there is no {stage} entry point `{name}`"),

@@ -24,7 +24,7 @@
 //! Generation", 1993, chapter 1; Brian Guenter, Todd B. Knoblock, Erik Ruf, "Specializing Shaders", 1995.
 
 mod absent;
-mod place;
+pub(crate) mod place;
 
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};

@@ -9,7 +9,7 @@ use naga::{AddressSpace, ArraySize, Expression, StorageAccess, TypeInner};
 const MOST: usize = 4096;
 
 /// A number, vector, matrix, or a column or component of one, in a buffer that the shader does not write.
-pub(super) struct Place {
+pub(crate) struct Place {
     /// `lighting.lights[*].colour`: `[*]` stands for an index that varies. A column of a matrix and a component of a vector
     /// read `[1]` too.
     pub(super) path: String,
@@ -23,7 +23,7 @@ pub(super) struct Place {
 
 impl Place {
     /// The place that a value loads, when it loads one.
-    pub(super) fn loaded(flow: &Flow, value: Value) -> Option<Self> {
+    pub(crate) fn loaded(flow: &Flow, value: Value) -> Option<Self> {
         let mut indices = Vec::new();
         let mut at = pointer(flow, value)?;
         let variable = loop {
@@ -114,7 +114,7 @@ impl Place {
 
     /// What the scene states is there, as the bits of each component: the same for every element that varying indices may
     /// choose.
-    pub(super) fn words(&self, facts: &Facts) -> Option<Vec<u32>> {
+    pub(crate) fn words(&self, facts: &Facts) -> Option<Vec<u32>> {
         let all = self.counts.iter().map(|count| *count as usize);
         let elements = all.product::<usize>();
         if elements > MOST {

@@ -1,0 +1,354 @@
+//! The parameter block of a variant: what is computed once a draw, and read by its stages as a uniform.
+//!
+//! ```text
+//! struct LodParameters { radiance: vec3f, .. }          the members, by name
+//! var<storage, read_write> parameters_stored            the parameter stage stores them here, all at once, at its end
+//! var<uniform> parameters                               the other stages read them here
+//! ```
+//!
+//! The parameter stage is a compute entry point of one invocation without inputs. A host runs it when uniforms change, or
+//! does what it does by itself. Both variables are one buffer's; they have the bindings behind the author's last one.
+//! A member that no stage reads any more goes, with what computed it, and with the last member the block.
+
+use crate::edit::{Edit, without};
+use crate::interface::layout;
+use crate::shader::{Shader, Stage};
+use naga::{
+    AddressSpace, Arena, Binding, Block, EntryPoint, Expression, Function, FunctionResult,
+    GlobalVariable, Handle, Module, ResourceBinding, ShaderStage, Span, Statement, StorageAccess,
+    StructMember, Type, TypeInner,
+};
+use std::collections::BTreeSet;
+
+/// The name of the parameter stage's entry point, unless the author has that name.
+const ENTRY: &str = "lod_parameters";
+/// The name of the block's type.
+const TYPE: &str = "LodParameters";
+/// The name of the variable that is read.
+const READ: &str = "parameters";
+/// The name of the variable that is stored to.
+const STORED: &str = "parameters_stored";
+/// What is put behind a name that the author has.
+const SUFFIX: &str = "_of_lod";
+
+/// The parameter block of a variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterBlock {
+    /// Its type: a structure of scalars and vectors of 32 bits.
+    pub ty: Handle<Type>,
+    /// The uniform variable that the fragment and the vertex stage read.
+    pub read: Handle<GlobalVariable>,
+    /// The storage variable that the parameter stage stores to.
+    pub stored: Handle<GlobalVariable>,
+}
+
+impl Shader {
+    /// The parameter block, of a variant that has one.
+    pub fn parameter_block(&self) -> Option<ParameterBlock> {
+        let function = self.function(Stage::Parameter)?;
+        let (_, variable, _) = stored(&function.body, &function.expressions)?;
+        Some(block_of(&self.module, variable))
+    }
+
+    /// The members of the parameter block, in the order of their offsets; none without one.
+    pub fn parameters(&self) -> &[StructMember] {
+        match self.parameter_block() {
+            Some(block) => members(&self.module, block.ty),
+            None => &[],
+        }
+    }
+
+    /// The parameter stage as an entry point of a module that returns the block's members, each at the location that is
+    /// its place in the block, and stores nothing; and its place among the module's entry points.
+    pub fn parameters_returned(&self) -> Option<(Module, usize)> {
+        let block = self.parameter_block()?;
+        let entry = self.index(Stage::Parameter)?;
+        let mut module = without(&self.module, entry);
+        let mut function = self.module.entry_points[entry].function.clone();
+        let (at, _, _) = stored(&function.body, &function.expressions)?;
+        let Some(Statement::Store { value, .. }) = function.body.get(at) else {
+            return None;
+        };
+        let value = *value;
+        let mut members = members(&module, block.ty).to_vec();
+        for (location, member) in (0..).zip(&mut members) {
+            member.binding = Some(Binding::Location {
+                location,
+                interpolation: None,
+                sampling: None,
+                blend_src: None,
+                per_primitive: false,
+            });
+        }
+        let ty = structure(&mut module, "Returned".into(), members);
+        if let Expression::Compose { ty: of, .. } = &mut function.expressions[value] {
+            *of = ty;
+        }
+        let end = [Statement::Return { value: Some(value) }];
+        let last = function.body.len();
+        function
+            .body
+            .splice(at..last, Block::from_vec(end.to_vec()));
+        function.result = Some(FunctionResult { ty, binding: None });
+        module.entry_points[entry].function = function;
+        // Without an interface it is like a vertex stage.
+        module.entry_points[entry].stage = ShaderStage::Vertex;
+        Some((module, entry))
+    }
+}
+
+/// The store of a parameter stage: its place in the body, the variable, and the values of the members.
+pub(crate) fn stored<'e>(
+    body: &Block,
+    expressions: &'e Arena<Expression>,
+) -> Option<(usize, Handle<GlobalVariable>, &'e [Handle<Expression>])> {
+    let at = body
+        .iter()
+        .rposition(|statement| matches!(statement, Statement::Store { .. }))?;
+    let Statement::Store { pointer, value } = body[at] else {
+        return None;
+    };
+    match (&expressions[pointer], &expressions[value]) {
+        (Expression::GlobalVariable(variable), Expression::Compose { components, .. }) => {
+            Some((at, *variable, components))
+        }
+        _ => None,
+    }
+}
+
+/// The block that a variable is of, which the parameter stage stores to.
+fn block_of(module: &Module, stored: Handle<GlobalVariable>) -> ParameterBlock {
+    let ty = module.global_variables[stored].ty;
+    let mut variables = module.global_variables.iter();
+    let read = variables.find(|(_, v)| v.ty == ty && matches!(v.space, AddressSpace::Uniform));
+    let (read, _) = read.expect("what is stored is read");
+    ParameterBlock { ty, read, stored }
+}
+
+fn members(module: &Module, ty: Handle<Type>) -> &[StructMember] {
+    match &module.types[ty].inner {
+        TypeInner::Struct { members, .. } => members,
+        other => unreachable!("{other:?} is no block"),
+    }
+}
+
+/// A structure of these members, one behind the other.
+fn structure(module: &mut Module, name: String, mut members: Vec<StructMember>) -> Handle<Type> {
+    let (mut end, mut widest) = (0, 4);
+    for member in &mut members {
+        let (size, alignment) = layout(&module.types[member.ty].inner);
+        member.offset = u32::next_multiple_of(end, alignment);
+        end = member.offset + size;
+        widest = widest.max(alignment);
+    }
+    let inner = TypeInner::Struct {
+        members,
+        span: end.next_multiple_of(widest),
+    };
+    let name = Some(name);
+    module.types.insert(Type { name, inner }, Span::UNDEFINED)
+}
+
+/// Gives a block other members.
+fn change(module: &mut Module, block: ParameterBlock, members: Vec<StructMember>) -> Handle<Type> {
+    let name = module.types[block.ty].name.clone().unwrap_or_default();
+    let ty = structure(module, name, members);
+    for variable in [block.read, block.stored] {
+        module.global_variables[variable].ty = ty;
+    }
+    ty
+}
+
+/// Puts members behind those of a block, or makes one. Returns the variable that is stored to, and its type.
+pub(crate) fn extended(
+    module: &mut Module,
+    stored: Option<Handle<GlobalVariable>>,
+    added: Vec<(String, Handle<Type>)>,
+) -> (Handle<GlobalVariable>, Handle<Type>) {
+    let member = |(name, ty): (String, Handle<Type>)| StructMember {
+        name: Some(name),
+        ty,
+        binding: None,
+        offset: 0,
+    };
+    let added = added.into_iter().map(member);
+    if let Some(stored) = stored {
+        let block = block_of(module, stored);
+        let mut all = members(module, block.ty).to_vec();
+        all.extend(added);
+        return (stored, change(module, block, all));
+    }
+    let taken = names(module);
+    let [name, read, stored] = [TYPE, READ, STORED].map(|name| free(name, &taken));
+    let ty = structure(module, name, added.collect());
+    let bindings = module.global_variables.iter();
+    let last = bindings
+        .filter_map(|(_, variable)| variable.binding)
+        .map(|binding| (binding.group, binding.binding))
+        .max();
+    let (group, first) = last.map_or((0, 0), |(group, binding)| (group, binding + 1));
+    let mut variable = |name, binding, space| {
+        let variable = GlobalVariable {
+            name: Some(name),
+            space,
+            binding: Some(ResourceBinding { group, binding }),
+            ty,
+            init: None,
+            memory_decorations: naga::MemoryDecorations::empty(),
+        };
+        module.global_variables.append(variable, Span::UNDEFINED)
+    };
+    variable(read, first, AddressSpace::Uniform);
+    let access = StorageAccess::LOAD | StorageAccess::STORE;
+    let stored = variable(stored, first + 1, AddressSpace::Storage { access });
+    (stored, ty)
+}
+
+/// The names of a module, of its entry points' values and variables among them.
+fn names(module: &Module) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    found.extend(module.types.iter().filter_map(|(_, ty)| ty.name.clone()));
+    let constants = module.constants.iter();
+    found.extend(constants.filter_map(|(_, constant)| constant.name.clone()));
+    let overrides = module.overrides.iter();
+    found.extend(overrides.filter_map(|(_, value)| value.name.clone()));
+    let variables = module.global_variables.iter();
+    found.extend(variables.filter_map(|(_, variable)| variable.name.clone()));
+    for point in &module.entry_points {
+        found.insert(point.name.clone());
+        let arguments = point.function.arguments.iter();
+        found.extend(arguments.filter_map(|argument| argument.name.clone()));
+        let locals = point.function.local_variables.iter();
+        found.extend(locals.filter_map(|(_, local)| local.name.clone()));
+        found.extend(point.function.named_expressions.values().cloned());
+    }
+    found
+}
+
+fn free(name: &str, taken: &BTreeSet<String>) -> String {
+    let mut name = name.to_owned();
+    while taken.contains(&name) {
+        name.push_str(SUFFIX);
+    }
+    name
+}
+
+/// The shader with a parameter stage: an empty one where it has none.
+pub(crate) fn with_stage(shader: &Shader) -> Shader {
+    let mut shader = shader.clone();
+    if shader.index(Stage::Parameter).is_some() {
+        return shader;
+    }
+    let name = free(ENTRY, &names(&shader.module));
+    let mut function = Function::default();
+    function
+        .body
+        .push(Statement::Return { value: None }, Span::UNDEFINED);
+    shader.module.entry_points.push(EntryPoint {
+        name,
+        stage: ShaderStage::Compute,
+        early_depth_test: None,
+        workgroup_size: [1, 1, 1],
+        workgroup_size_overrides: None,
+        function,
+        mesh_info: None,
+        task_payload: None,
+        incoming_ray_payload: None,
+    });
+    shader.ids.push(Vec::new());
+    Shader::changed(shader.module, shader.ids, shader.authors)
+}
+
+/// A name for a member that no member has.
+pub(crate) fn member_name(shader: &Shader, wish: &str) -> String {
+    let taken = |name: &str| {
+        let mut members = shader.parameters().iter();
+        members.any(|member| member.name.as_deref() == Some(name))
+    };
+    let mut name = wish.to_owned();
+    let mut ordinal = 1;
+    while taken(&name) {
+        ordinal += 1;
+        name = format!("{wish}_{ordinal}");
+    }
+    name
+}
+
+/// Brings the block in order: without what no stage reads, by name.
+pub(crate) fn settle(shader: Shader) -> Shader {
+    let Some(block) = shader.parameter_block() else {
+        return shader;
+    };
+    let all = shader.parameters();
+    let mut read = vec![false; all.len()];
+    for point in &shader.module.entry_points {
+        let values = &point.function.expressions;
+        for (_, expression) in values.iter() {
+            if let Expression::AccessIndex { base, index } = *expression
+                && matches!(values[base], Expression::GlobalVariable(v) if v == block.read)
+            {
+                read[index as usize] = true;
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..all.len()).filter(|at| read[*at]).collect();
+    order.sort_by(|a, b| all[*a].name.cmp(&all[*b].name));
+    if order.iter().copied().eq(0..all.len()) {
+        return shader;
+    }
+    let members: Vec<StructMember> = order.iter().map(|at| all[*at].clone()).collect();
+    let dropped = members.len() < all.len();
+    let Shader {
+        mut module,
+        mut ids,
+        authors,
+        ..
+    } = shader;
+    let mut entries = module.entry_points.iter();
+    let entry = entries.position(|point| point.stage == ShaderStage::Compute);
+    let entry = entry.expect("the block has a stage");
+    if members.is_empty() {
+        module.entry_points.remove(entry);
+        ids.remove(entry);
+        // Nothing is behind the block's variables, so that all others keep their handles.
+        let mut variables = Arena::new();
+        for (variable, declared) in module.global_variables.iter() {
+            if variable != block.read && variable != block.stored {
+                let span = module.global_variables.get_span(variable);
+                variables.append(declared.clone(), span);
+            }
+        }
+        module.global_variables = variables;
+        return Shader::changed(module, ids, authors);
+    }
+    let ty = change(&mut module, block, members);
+    for point in &mut module.entry_points {
+        let values = &mut point.function.expressions;
+        let of_block: Vec<Handle<Expression>> = values
+            .iter()
+            .filter(|(_, e)| matches!(e, Expression::GlobalVariable(v) if *v == block.read))
+            .map(|(value, _)| value)
+            .collect();
+        for (_, expression) in values.iter_mut() {
+            if let Expression::AccessIndex { base, index } = expression
+                && of_block.contains(base)
+            {
+                let new = order.iter().position(|old| *old == *index as usize);
+                *index = new.map_or(*index, |new| new as u32);
+            }
+        }
+    }
+    let function = &mut module.entry_points[entry].function;
+    if let Some((at, _, components)) = stored(&function.body, &function.expressions)
+        && let Statement::Store { value, .. } = function.body[at]
+    {
+        let components = order.iter().map(|old| components[*old]).collect();
+        function.expressions[value] = Expression::Compose { ty, components };
+    }
+    let shader = Shader::changed(module, ids, authors);
+    match dropped {
+        // What computed it goes.
+        true => Edit::new(&shader, Stage::Parameter).finish(),
+        false => shader,
+    }
+}
