@@ -11,7 +11,7 @@ use lodc::eval::program::Program;
 use lodc::eval::raster::rasterize;
 use lodc::front::Source;
 use lodc::scene::Scene;
-use lodc::search::{SampleSet, Samples, Stand};
+use lodc::search::{Programs, SampleSet, Samples, Stand};
 use lodc_passes::{Rate, Rates, Shader, Stage, operands};
 use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
 use naga::{Expression, Handle, Module, ShaderStage, Statement};
@@ -276,7 +276,8 @@ fn emitted_levels_have_the_errors_that_are_reported() {
             let shader = specialised(&emitted, Some(f64::from(level.autolod as f32)));
             let set = SampleSet::new(&stand, level.distance, Samples::Full)
                 .unwrap_or_else(|r| panic!("{}", r.what));
-            let measured = set.measure_program(&programs(&shader, &scene).1);
+            let (vertex, fragment) = programs(&shader, &scene);
+            let measured = set.measure_programs(&Programs::new(vertex, fragment));
             let rmse = measured.error.square().sqrt();
             assert!(
                 (rmse - level.error.rmse).abs() <= 1e-6,

@@ -21,6 +21,9 @@ pub struct Work {
     pub special: f64,
     /// Texture samples, loads and gathers.
     pub samples: f64,
+    /// What has been moved to other stages and is executed there, and what handing it over costs, in full-rate scalar
+    /// operations.
+    pub moved: f64,
 }
 
 /// Full-rate scalar operations that a quarter-rate one is worth.
@@ -32,6 +35,8 @@ pub const SAMPLE_WEIGHT: f64 = 100.0;
 /// Full-rate scalar operations that the interpolation of one component of a fragment's input is worth: two
 /// multiplications and two additions, with the values of a triangle's corners at hand as differences.
 pub const INTERPOLATION_WEIGHT: f64 = 4.0;
+/// The same of a component that is the same for a whole triangle.
+pub const FLAT_WEIGHT: f64 = 1.0;
 
 impl Work {
     /// Arithmetic alone, in full-rate scalar operations.
@@ -41,7 +46,7 @@ impl Work {
 
     /// All of it in one number, in full-rate scalar operations.
     pub fn total(&self) -> f64 {
-        self.operations() + SAMPLE_WEIGHT * self.samples
+        self.operations() + SAMPLE_WEIGHT * self.samples + self.moved
     }
 }
 
@@ -52,6 +57,7 @@ impl Add for Work {
             simple: self.simple + other.simple,
             special: self.special + other.special,
             samples: self.samples + other.samples,
+            moved: self.moved + other.moved,
         }
     }
 }
@@ -69,6 +75,7 @@ impl Mul<f64> for Work {
             simple: self.simple * times,
             special: self.special * times,
             samples: self.samples * times,
+            moved: self.moved * times,
         }
     }
 }

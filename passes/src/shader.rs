@@ -3,6 +3,7 @@
 //! Normal form is made by [`mod@crate::normalize`] and changed only by [`crate::edit`].
 //! The module holds the chosen entry points and no other function.
 
+use crate::cost::{FLAT_WEIGHT, INTERPOLATION_WEIGHT};
 use crate::flow::Findings;
 use crate::interface::Authors;
 use crate::operands::User;
@@ -286,6 +287,28 @@ impl Shader {
         Validator::new(ValidationFlags::all(), Capabilities::all())
             .validate(&self.module)
             .map_err(Box::new)
+    }
+
+    /// What handing over the values costs that passes have moved to the vertex stage, for a fragment, in full-rate scalar
+    /// operations; `None` when none has been moved, and the vertex stage is the author's.
+    pub fn handing_over(&self) -> Option<f64> {
+        let function = self.function(Stage::Fragment)?;
+        let added = function.arguments.get(self.authors.arguments..)?;
+        let costs = added.iter().map(|argument| {
+            let components = match self.module.types[argument.ty].inner {
+                TypeInner::Vector { size, .. } => size as u32,
+                _ => 1,
+            };
+            let each = match argument.binding {
+                Some(naga::Binding::Location {
+                    interpolation: Some(naga::Interpolation::Flat),
+                    ..
+                }) => FLAT_WEIGHT,
+                _ => INTERPOLATION_WEIGHT,
+            };
+            each * f64::from(components)
+        });
+        (!added.is_empty()).then(|| costs.sum())
     }
 
     /// The identity of one stage: a hash of what its entry point does.

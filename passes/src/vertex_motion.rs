@@ -31,7 +31,7 @@
 //! This work is based on: Songfang Liang et al., "Automatic Generation of Levels of Detail for Shaders and Meshes", 2022,
 //! section 4.1; Rui Wang et al., "Automatic Shader Simplification using Surface Signal Approximation", 2014, section 4.
 
-use crate::cost::{self, INTERPOLATION_WEIGHT};
+use crate::cost::{self, FLAT_WEIGHT, INTERPOLATION_WEIGHT};
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
 use crate::interface::{self, Output};
@@ -484,7 +484,7 @@ impl<'a> Study<'a> {
     /// What handing a value over costs.
     fn handing_over(&self, value: Value, choice: Choice) -> f64 {
         let each = match choice {
-            Choice::Flat => FLAT,
+            Choice::Flat => FLAT_WEIGHT,
             _ => INTERPOLATION_WEIGHT,
         };
         each * self.flow.floats(value).unwrap_or(0) as f64
@@ -619,9 +619,6 @@ impl<'a> Study<'a> {
 
 /// What making a direction a unit one costs.
 const NORMALISE: f64 = 12.0;
-
-/// What handing a component over flat costs.
-const FLAT: f64 = 1.0;
 
 fn full() -> Declined {
     Declined(format!(

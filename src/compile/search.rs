@@ -11,7 +11,7 @@ use crate::report::{Input, Origin, Report};
 use crate::scene::{Reading, Scene};
 use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
 use crate::{Diagnostic, Result};
-use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, cost};
+use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage};
 use naga::Expression;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -281,7 +281,6 @@ impl Ready {
     }
 
     fn origin(&self, request: &Request) -> Origin {
-        let vertex = self.base.function(Stage::Vertex);
         Origin {
             command: request.command.clone(),
             seed: self.scene.seed,
@@ -289,9 +288,6 @@ impl Ready {
             bound: self.scene.reading.name(),
             inputs: self.read_files(),
             triangles: self.scene.mesh.indices.len() / 3,
-            vertex: vertex
-                .and_then(|function| cost::of_function(self.base.module(), function).ok())
-                .unwrap_or_default(),
             warnings: self
                 .scene
                 .warnings

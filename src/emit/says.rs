@@ -42,6 +42,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut fitted = Vec::new();
     let mut without = Vec::new();
     let mut widened = Vec::new();
+    let mut moved = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -58,6 +59,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
                 fitted.push(format!("{site} fitted to {}", short(operand.path())));
             }
             Some(("normal-to-roughness", _)) => widened.push(site),
+            None if pass == "vertex-motion" => moved.push(site),
             _ => others.push(format!("{site}: {}", candidate.choice)),
         }
     }
@@ -86,6 +88,9 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             "{} removed, roughness widened",
             listed(&widened, "normal maps")
         ));
+    }
+    if !moved.is_empty() {
+        clauses.push(format!("{} per vertex", listed(&moved, "values")));
     }
     match kept.len() {
         0..=2 => clauses.append(&mut kept),
@@ -143,10 +148,12 @@ mod tests {
             candidate("op-removal", "main.ambient", "without"),
             candidate("op-removal", "main.sky", "best"),
             candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
+            candidate("vertex-motion", "main.specular", "interpolate"),
+            candidate("vertex-motion", "main.sun", "flat"),
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine"
+            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }

@@ -75,6 +75,7 @@ impl ComparedAt {
             cost: works.map(|[_, other]| CostReport {
                 operations: other.operations(),
                 texture_samples: other.samples,
+                moved_operations: 0.0,
                 vertex_operations: 0.0,
                 parameters: 0,
                 texture_bytes: 0,

@@ -11,7 +11,7 @@ pub use terminal::{inspection, next, summary, table};
 
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
-use lodc_passes::{Class, PASSES, Shader, Work};
+use lodc_passes::{Class, PASSES, Shader, Stage, cost};
 use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
@@ -136,6 +136,9 @@ pub struct CostReport {
     pub operations: f64,
     /// Texture samples of a covered fragment.
     pub texture_samples: f64,
+    /// What was moved to the vertices and is done there, and what handing it over costs, in full-rate scalar operations a
+    /// covered fragment.
+    pub moved_operations: f64,
     /// Arithmetic of a vertex, static, in full-rate scalar operations.
     pub vertex_operations: f64,
     /// Parameters that the host must fill.
@@ -211,8 +214,6 @@ pub struct Origin {
     pub inputs: Vec<Input>,
     /// Triangles of the scene's mesh.
     pub triangles: usize,
-    /// Static work of a vertex.
-    pub vertex: Work,
     /// What should be known about this result.
     pub warnings: Vec<String>,
     /// What was inferred.
@@ -277,6 +278,14 @@ impl ErrorReport {
     }
 }
 
+/// Arithmetic of a vertex, static, in full-rate scalar operations.
+fn of_vertex(shader: &Shader) -> f64 {
+    let work = shader
+        .function(Stage::Vertex)
+        .and_then(|function| cost::of_function(shader.module(), function).ok());
+    work.map_or(0.0, |work| work.operations())
+}
+
 fn level_report(
     level: &Level,
     says: String,
@@ -302,7 +311,8 @@ fn level_report(
         cost: CostReport {
             operations: level.work.operations(),
             texture_samples: level.work.samples,
-            vertex_operations: origin.vertex.operations(),
+            moved_operations: level.work.moved,
+            vertex_operations: of_vertex(&level.shader),
             parameters: 0,
             texture_bytes: 0,
         },

@@ -7,8 +7,8 @@
 //! what one does is not done again by another. This is a step of Gauss and Newton on the measured error itself.
 
 use super::interval::Interval;
-use super::samples::{Measured, SampleSet, compile};
-use crate::eval::program::Program;
+use super::programs::Programs;
+use super::samples::{Measured, SampleSet};
 use lodc_passes::{Candidate, Shader, recipe};
 use rayon::prelude::*;
 
@@ -94,11 +94,11 @@ fn step(
         .map(|number| FORWARD * number.abs().max(SMALL))
         .collect();
     let mut programs = Vec::with_capacity(numbers.len() + 1);
-    programs.push(compile(&made(numbers)?.1, &[]).ok()?);
+    programs.push(Programs::of(&made(numbers)?.1).ok()?);
     for (i, forward) in forward.iter().enumerate() {
         let mut moved = numbers.to_vec();
         moved[i] += forward;
-        programs.push(compile(&made(&moved)?.1, &[]).ok()?);
+        programs.push(Programs::of(&made(&moved)?.1).ok()?);
     }
     let mut normal = Normal::new(numbers.len());
     for set in interval.sets() {
@@ -109,7 +109,7 @@ fn step(
 
 /// Adds what a set of samples shows to the normal equations. The first program has the numbers as they are, each
 /// other one has one of them moved forward.
-fn linearise(set: &SampleSet<'_>, programs: &[Program], forward: &[f32], normal: &mut Normal) {
+fn linearise(set: &SampleSet<'_>, programs: &[Programs], forward: &[f32], normal: &mut Normal) {
     let output = set.stand.scene.output;
     // As much as each squared difference has in the load.
     let weight = set.load_of_square().sqrt();
@@ -214,6 +214,7 @@ impl Normal {
 mod tests {
     use super::*;
     use crate::compile::normal_form;
+    use crate::eval::program::Program;
     use crate::front::Source;
     use crate::scene::Scene;
     use crate::search::{Samples, Stand};

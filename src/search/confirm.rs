@@ -5,7 +5,8 @@ use super::descend::Confirmed;
 use super::error::{Details, exceeds};
 use super::guard::Guard;
 use super::levels::{Level, threshold};
-use super::samples::{Measured, SampleSet, Samples, Stand, compile};
+use super::programs::Programs;
+use super::samples::{Measured, SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use crate::scene::Split;
 use lodc_passes::{Recipe, Shader};
@@ -84,7 +85,7 @@ impl<'a> Checks<'a> {
 
     /// Draws a shader in full, over its whole interval.
     pub(super) fn judge(&self, shader: &Shader) -> Result<Verdict, Refused> {
-        let program = compile(shader, &[])?;
+        let programs = Programs::of(shader)?;
         let mut start = None;
         let mut verdict = Verdict {
             finding: Finding::Over,
@@ -93,7 +94,7 @@ impl<'a> Checks<'a> {
         };
         let mut strain = 0.0_f64;
         for set in &self.full {
-            let (details, measured) = set.in_full(&program);
+            let (details, measured) = set.in_full(&programs);
             let figures = set.figures_of(&details);
             strain = strain.max(measured.strain);
             verdict.strain_of_means = verdict.strain_of_means.max(figures.strain_of_means());

@@ -1,6 +1,7 @@
 //! Facts: what the samples of a scene show of the values of a shader, and what is known of its textures, at one
 //! distance.
 
+use super::programs::Programs;
 use super::samples::SampleSet;
 use crate::eval::draw::{Blend, Shading, shade_into, shade_weighed};
 use crate::eval::machine::Profile;
@@ -39,26 +40,32 @@ impl SampleSet<'_> {
             ..Facts::default()
         };
         let compiled = Program::compile_with_pairs(shader.module(), entry, &probes, &pairs);
-        let Ok(program) = compiled else {
+        let Ok(programs) = compiled.and_then(|program| Programs::with(shader, program)) else {
             return facts;
         };
+        let program = &programs.fragment;
         let profiles: Vec<_> = self
             .frames
             .par_iter()
             .flat_map_iter(|frame| frame.drawings.iter().map(move |drawing| (frame, drawing)))
             .map(|(frame, drawing)| {
                 let mut shading = Shading::default();
+                let bindings = &frame.frame.bindings;
                 let Some(seen) = &drawing.seen else {
-                    shade_into(&program, &drawing.coverage, &frame.bindings, &mut shading);
+                    let coverage = drawing.covered(&programs, &frame.frame);
+                    shade_into(program, &coverage, bindings, &mut shading);
                     return shading.profile;
                 };
+                let coverage = match programs.vertex {
+                    Some(_) => &drawing.with_inputs(&seen.coverage, &programs, &frame.frame),
+                    None => &seen.coverage,
+                };
                 let Some(weights) = &seen.weights else {
-                    shade_into(&program, &seen.coverage, &frame.bindings, &mut shading);
+                    shade_into(program, coverage, bindings, &mut shading);
                     return shading.profile;
                 };
                 let mut weighed = |weights| {
-                    let bindings = &frame.bindings;
-                    shade_weighed(&program, &seen.coverage, bindings, weights, &mut shading);
+                    shade_weighed(program, coverage, bindings, weights, &mut shading);
                     shading.profile.clone()
                 };
                 let by_share = weighed(&weights.share);

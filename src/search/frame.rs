@@ -5,14 +5,19 @@ use super::error::{
     BACKGROUNDS, FrameError, Reference, ReferencePixel, Shown, TILE, Tally, displayed, encoded,
     held, through,
 };
+use super::programs::Programs;
 use crate::eval::draw::{Layers, Lit, Seen, Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::image::Picture;
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::scene::{Output, Scene, chance::mix};
-use std::collections::BTreeSet;
-use std::sync::Arc;
+use lodc_passes::{Fingerprint, Work};
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Of how many vertex stages that variants have of their own it is kept what they hand over.
+const KEPT: usize = 4;
 
 /// Fine pixels of the reference to a pixel, along each axis.
 pub(super) const GRID: u32 = 4;
@@ -40,7 +45,8 @@ pub(super) struct Pen<'a> {
 pub(super) struct Rasterised {
     /// Which of the scene's views it is, from 0.
     view: usize,
-    pub(super) bindings: Bindings,
+    /// What was rasterised, at the centre of the pixel.
+    pub(super) frame: Frame,
     /// One for each offset.
     pub(super) drawings: Vec<Drawing>,
     /// The pixels that the reference or a fragment covers.
@@ -49,13 +55,30 @@ pub(super) struct Rasterised {
 
 /// A frame rasterised at one offset.
 pub(super) struct Drawing {
-    pub(super) coverage: Coverage,
+    pub(super) coverage: Arc<Coverage>,
+    /// Where in a pixel it is sampled.
+    offset: [f32; 2],
+    /// With the inputs of variants that have a vertex stage of their own, known by the identity of that; the latest.
+    wider: Option<Mutex<VecDeque<(Option<Fingerprint>, Arc<Coverage>)>>>,
     /// What lights it, in a deferred scene.
     lit: Option<Lit>,
     /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.
     pub(super) seen: Option<Seen>,
     /// For each covered fragment, its place in the reference.
     places: Vec<u32>,
+}
+
+/// What was executed for a frame, at all of its offsets together.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Executed {
+    /// Covered fragments that were shaded.
+    pub(super) fragments: u64,
+    /// In them.
+    pub(super) work: Work,
+    /// Covered fragments of the whole pictures.
+    pub(super) drawn: usize,
+    /// What the vertex stage did more than the original's at all vertices, in full-rate scalar operations.
+    pub(super) at_vertices: f64,
 }
 
 impl Rasterised {
@@ -134,12 +157,12 @@ impl Rasterised {
                 let drawings = drawings.map(|(coverage, offset)| {
                     let lit = pen.scene.lit(&at(frame, *offset, 1), &coverage);
                     let bindings = (&frame.bindings, output);
-                    Drawing::new(pen.fragment, coverage, lit, &pixels, bindings)
+                    Drawing::new(pen.fragment, (coverage, *offset), lit, &pixels, bindings)
                 });
                 Self {
                     view,
                     drawings: drawings.collect(),
-                    bindings: frame.bindings.clone(),
+                    frame: at(frame, [0.0; 2], 1),
                     reference: Arc::clone(&reference),
                 }
             })
@@ -151,10 +174,12 @@ impl Rasterised {
         self.view
     }
 
-    /// From now on what variants read of textures is remembered (see [`Coverage::remember`]).
+    /// From now on what variants read of textures is remembered (see [`Coverage::remember`]), and what their own vertex
+    /// stages hand over.
     pub(super) fn remember(&mut self) {
         for drawing in &mut self.drawings {
-            drawing.coverage.remember();
+            Arc::make_mut(&mut drawing.coverage).remember();
+            drawing.wider = Some(Mutex::default());
         }
     }
 
@@ -163,30 +188,32 @@ impl Rasterised {
         self.reference.tile_places()
     }
 
-    /// Draws a program at every offset and compares with the reference.
-    pub(super) fn measure(
-        &self,
-        program: &Program,
-        output: Output,
-    ) -> (FrameError, Option<Profile>) {
+    /// Draws a variant at every offset and compares with the reference.
+    pub(super) fn measure(&self, programs: &Programs, output: Output) -> (FrameError, Executed) {
         let mut shading = Shading::default();
-        let mut profile: Option<Profile> = None;
+        let mut executed = Executed::default();
         let mut tally = Tally::new(&self.reference);
         for drawing in &self.drawings {
-            drawing.shade(program, &self.bindings, &mut shading);
+            let coverage = drawing.covered(programs, &self.frame);
+            drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
             tally.add(&drawing.colours(&shading, self.reference.len(), output));
-            match &mut profile {
-                Some(profile) => profile.absorb(&shading.profile),
-                None => profile = Some(shading.profile.clone()),
-            }
+            executed.fragments += shading.profile.lanes;
+            executed.work += shading.profile.work;
+            executed.drawn += coverage.drawn;
+            let each = |coverage: &Coverage| {
+                let Profile { work, lanes, .. } = &coverage.vertex_profile;
+                work.total() / (*lanes).max(1) as f64
+            };
+            let more = (each(&coverage) - each(&drawing.coverage)).max(0.0);
+            executed.at_vertices += more * self.frame.mesh.positions.len() as f64;
         }
-        (tally.finish(), profile)
+        (tally.finish(), executed)
     }
 
-    /// FLIP of a program's picture at the first offset: its sum over pixels, and how many those are.
+    /// FLIP of a variant's picture at the first offset: its sum over pixels, and how many those are.
     pub(super) fn flip(
         &self,
-        program: &Program,
+        programs: &Programs,
         output: Output,
         pixels_per_degree: f64,
     ) -> (f64, usize) {
@@ -194,18 +221,20 @@ impl Rasterised {
             return (0.0, 0);
         };
         let mut shading = Shading::default();
-        drawing.shade(program, &self.bindings, &mut shading);
+        let coverage = drawing.covered(programs, &self.frame);
+        drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
         let colours = drawing.colours(&shading, self.reference.len(), output);
         self.reference.flip(&colours, pixels_per_degree)
     }
 
-    /// For each program, what it leaves at each pixel of every drawing (see [`Reference::differences`]).
-    pub(super) fn differences(&self, programs: &[Program], output: Output) -> Vec<Vec<[f32; 6]>> {
+    /// For each variant, what it leaves at each pixel of every drawing (see [`Reference::differences`]).
+    pub(super) fn differences(&self, programs: &[Programs], output: Output) -> Vec<Vec<[f32; 6]>> {
         let mut shading = Shading::default();
         let mut of_all = vec![Vec::new(); programs.len()];
         for drawing in &self.drawings {
-            for (program, differences) in programs.iter().zip(&mut of_all) {
-                drawing.shade(program, &self.bindings, &mut shading);
+            for (programs, differences) in programs.iter().zip(&mut of_all) {
+                let coverage = drawing.covered(programs, &self.frame);
+                drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
                 let colours = drawing.colours(&shading, self.reference.len(), output);
                 differences.extend(self.reference.differences(&colours));
             }
@@ -313,7 +342,7 @@ fn over_black(fine: &Coverage, shading: &Shading, output: Output) -> (Picture, O
 impl Drawing {
     fn new(
         original: &Program,
-        coverage: Coverage,
+        (coverage, offset): (Coverage, [f32; 2]),
         lit: Option<Lit>,
         pixels: &[u32],
         (bindings, output): (&Bindings, Output),
@@ -331,16 +360,65 @@ impl Drawing {
             }),
             places,
             lit,
-            coverage,
+            coverage: Arc::new(coverage),
+            offset,
+            wider: None,
         }
     }
 
+    /// Its fragments, with the inputs that a variant has. The frame is the one that was rasterised.
+    pub(super) fn covered(&self, programs: &Programs, frame: &Frame) -> Arc<Coverage> {
+        let Some((_, identity)) = &programs.vertex else {
+            return Arc::clone(&self.coverage);
+        };
+        // A thread that panicked has left nothing half done.
+        let wider = self.wider.as_ref().filter(|_| identity.is_some());
+        let kept = wider.map(Mutex::lock);
+        let mut kept = kept.map(|kept| kept.unwrap_or_else(PoisonError::into_inner));
+        if let Some(kept) = &mut kept
+            && let Some((_, more)) = kept.iter().find(|(of, _)| of == identity)
+        {
+            return Arc::clone(more);
+        }
+        drop(kept);
+        let more = Arc::new(self.with_inputs(&self.coverage, programs, frame));
+        if let Some(wider) = wider {
+            let mut kept = wider.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.truncate(KEPT - 1);
+            kept.push_front((*identity, Arc::clone(&more)));
+        }
+        more
+    }
+
+    /// Some of its fragments with the inputs that a variant has.
+    pub(super) fn with_inputs(
+        &self,
+        coverage: &Coverage,
+        programs: &Programs,
+        frame: &Frame,
+    ) -> Coverage {
+        let Some((vertex, _)) = &programs.vertex else {
+            return coverage.clone();
+        };
+        let frame = Frame {
+            offset: self.offset,
+            ..frame.clone()
+        };
+        coverage.with_inputs_of(vertex, &programs.fragment, &frame)
+    }
+
     /// Shades what is drawn, and lights it in a deferred scene: the colours are those that are seen.
-    pub(super) fn shade(&self, program: &Program, bindings: &Bindings, shading: &mut Shading) {
+    fn shade(
+        &self,
+        programs: &Programs,
+        coverage: &Coverage,
+        bindings: &Bindings,
+        shading: &mut Shading,
+    ) {
         shade(
             self.lit.as_ref(),
-            program,
-            &self.coverage,
+            &programs.fragment,
+            coverage,
             bindings,
             shading,
         );

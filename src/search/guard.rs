@@ -6,7 +6,8 @@
 //! what spoils one highlight spoils the others.
 
 use super::error::Details;
-use super::samples::{Measured, SampleSet, Stand, Tiles, compile};
+use super::programs::Programs;
+use super::samples::{Measured, SampleSet, Stand, Tiles};
 use crate::eval::program::Refused;
 use lodc_passes::Shader;
 
@@ -50,9 +51,9 @@ impl<'a> Guard<'a> {
     /// Whether nothing that is known speaks against a variant.
     pub(crate) fn allows(&self, shader: &Shader, measured: &Measured) -> bool {
         self.admits(measured)
-            && compile(shader, &[]).is_ok_and(|program| {
+            && Programs::of(shader).is_ok_and(|programs| {
                 let mut sets = self.tiles.iter();
-                sets.all(|set| set.strain_of_tiles(&program) <= 1.0)
+                sets.all(|set| set.strain_of_tiles(&programs) <= 1.0)
             })
     }
 
@@ -134,8 +135,8 @@ mod tests {
         assert!(guard.allows(&flat, &measured), "{measured:?}");
 
         let full = SampleSet::new(&stand, near, Samples::Full).expect("it runs");
-        let program = compile(&flat, &[]).expect("it runs");
-        let (details, all) = full.in_full(&program);
+        let programs = Programs::of(&flat).expect("it runs");
+        let (details, all) = full.in_full(&programs);
         let figures = full.figures_of(&details);
         assert!(
             figures.strain_of_means() < 1.0 && all.strain > 1.0,
@@ -146,7 +147,7 @@ mod tests {
         assert!(guard.allows(&base, &search.start().original()));
         // Some tiles say what all say.
         assert_eq!(
-            guard.tiles[0].strain_of_tiles(&program),
+            guard.tiles[0].strain_of_tiles(&programs),
             figures.strain_of_tiles()
         );
         guard.start_at(far);

@@ -1,6 +1,7 @@
 //! The samples at several distances of the interval in which a level is used.
 
-use super::samples::{Measured, SampleSet, Samples, Stand, compile};
+use super::programs::Programs;
+use super::samples::{Measured, SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use lodc_passes::Shader;
 
@@ -31,8 +32,8 @@ impl<'a> Interval<'a> {
     /// Measures a variant at every distance: error and work are those at the start, the strain is the largest, the
     /// load the mean.
     pub(crate) fn measure(&self, shader: &Shader) -> Result<Measured, Refused> {
-        let program = compile(shader, &[])?;
-        let mut all = self.0.iter().map(|set| set.measure_program(&program));
+        let programs = Programs::of(shader)?;
+        let mut all = self.0.iter().map(|set| set.measure_programs(&programs));
         // There is at least one.
         let mut measured = all.next().unwrap_or_default();
         for other in all {

@@ -23,6 +23,7 @@ mod greedy;
 mod guard;
 mod interval;
 pub mod levels;
+mod programs;
 pub mod samples;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
@@ -31,4 +32,5 @@ pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
 pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, find};
+pub use programs::Programs;
 pub use samples::{Measured, OverBlack, SampleSet, Samples, Stand};

@@ -2,14 +2,14 @@
 //! the reference beside them. A variant is then one run of its fragment program.
 
 use super::error::{Details, ErrorFigures, ErrorSum};
-use super::frame::{Part, Pen, Rasterised, shown};
+use super::frame::{Executed, Part, Pen, Rasterised, shown};
+use super::programs::{self, Programs};
 use crate::eval::program::{Program, Refused};
 use crate::scene::{
     Scene, Split,
     chance::{child, unit},
 };
-use lodc_passes::{Shader, Stage, Work};
-use naga::{Expression, Handle};
+use lodc_passes::{Shader, Work};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -116,8 +116,10 @@ impl<'a> SampleSet<'a> {
         distance: f64,
         samples: Samples,
     ) -> Result<[Self; N], Refused> {
-        let programs = stands.iter().map(|stand| compile(stand.base, &[]));
-        let programs: Vec<Program> = programs.collect::<Result<_, _>>()?;
+        let programs = stands
+            .iter()
+            .map(|stand| programs::fragment(stand.base, &[]));
+        let mut programs: Vec<Program> = programs.collect::<Result<_, _>>()?;
         let scene = stands[0].scene;
         let frames = match samples {
             Samples::HeldOut(split) => scene.held_out(distance, split, HELD_OUT),
@@ -174,7 +176,8 @@ impl<'a> SampleSet<'a> {
                 set.frames.push(frame);
             }
         }
-        let original = sets[0].details(&programs[0]);
+        let original = Programs::with(stands[0].base, programs.swap_remove(0))?;
+        let original = sets[0].details(&original);
         for set in &mut sets {
             set.original = original.clone();
         }
@@ -190,7 +193,7 @@ impl<'a> SampleSet<'a> {
         distance: f64,
         tiles: &Tiles,
     ) -> Result<Self, Refused> {
-        let original = compile(stand.base, &[])?;
+        let original = Programs::of(stand.base)?;
         let scene = stand.scene;
         let frames = scene.frames(distance).into_par_iter().enumerate();
         let frames: Vec<Vec<Rasterised>> = frames
@@ -201,7 +204,7 @@ impl<'a> SampleSet<'a> {
                 let offsets = offsets(scene.offsets, seed);
                 let pen = Pen {
                     vertex: stand.vertex,
-                    fragment: &original,
+                    fragment: &original.fragment,
                     scene,
                 };
                 Some(Rasterised::new(
@@ -243,17 +246,17 @@ impl<'a> SampleSet<'a> {
     /// # Errors
     /// When the evaluator refuses it; a variant of an original that runs, runs.
     pub fn measure(&self, shader: &Shader) -> Result<Measured, Refused> {
-        Ok(self.measure_program(&compile(shader, &[])?))
+        Ok(self.measure_programs(&Programs::of(shader)?))
     }
 
-    /// Measures any fragment program with the original's interface.
-    pub fn measure_program(&self, fragment: &Program) -> Measured {
-        self.judge(&self.details(fragment))
+    /// Measures the programs of a variant.
+    pub fn measure_programs(&self, programs: &Programs) -> Measured {
+        self.judge(&self.details(programs))
     }
 
-    /// Measures a program, with all that was measured of it.
-    pub(super) fn in_full(&self, fragment: &Program) -> (Details, Measured) {
-        let details = self.details(fragment);
+    /// Measures a variant, with all that was measured of it.
+    pub(super) fn in_full(&self, programs: &Programs) -> (Details, Measured) {
+        let details = self.details(programs);
         let measured = self.judge(&details);
         (details.0, measured)
     }
@@ -263,7 +266,7 @@ impl<'a> SampleSet<'a> {
     /// # Errors
     /// When the evaluator refuses it.
     pub fn figures(&self, shader: &Shader) -> Result<ErrorFigures, Refused> {
-        let (details, _) = self.details(&compile(shader, &[])?);
+        let (details, _) = self.details(&Programs::of(shader)?);
         Ok(self.figures_of(&details))
     }
 
@@ -274,11 +277,11 @@ impl<'a> SampleSet<'a> {
     /// When the evaluator refuses it.
     pub fn flip(&self, shader: &Shader) -> Result<f64, Refused> {
         let scene = self.stand.scene;
-        let program = compile(shader, &[])?;
+        let programs = Programs::of(shader)?;
         let sums: Vec<(f64, usize)> = self
             .frames
             .par_iter()
-            .map(|frame| frame.flip(&program, scene.output, scene.pixels_per_degree))
+            .map(|frame| frame.flip(&programs, scene.output, scene.pixels_per_degree))
             .collect();
         let (sum, count) = sums
             .iter()
@@ -293,10 +296,11 @@ impl<'a> SampleSet<'a> {
     /// When the evaluator refuses it.
     pub fn pictures(&self, shader: &Shader) -> Result<Vec<OverBlack>, Refused> {
         let scene = self.stand.scene;
-        let fragment = compile(shader, &[])?;
+        let programs = Programs::of(shader)?;
+        let own = programs.vertex.as_ref().map(|(program, _)| program);
         let pen = Pen {
-            vertex: self.stand.vertex,
-            fragment: &fragment,
+            vertex: own.unwrap_or(self.stand.vertex),
+            fragment: &programs.fragment,
             scene,
         };
         let frames = scene.frames(self.distance);
@@ -311,7 +315,7 @@ impl<'a> SampleSet<'a> {
 
     /// Measures the original and a variant of it frame by frame: what a held-out split is judged by.
     pub(super) fn pair(&self, shader: &Shader) -> Result<(Details, &Details), Refused> {
-        let (details, _) = self.details(&compile(shader, &[])?);
+        let (details, _) = self.details(&Programs::of(shader)?);
         Ok((details, &self.original.0))
     }
 
@@ -335,8 +339,8 @@ impl<'a> SampleSet<'a> {
     }
 
     /// How much of its bound the worst of its tiles uses up.
-    pub(super) fn strain_of_tiles(&self, fragment: &Program) -> f64 {
-        self.figures_of(&self.details(fragment).0).strain_of_tiles()
+    pub(super) fn strain_of_tiles(&self, programs: &Programs) -> f64 {
+        self.figures_of(&self.details(programs).0).strain_of_tiles()
     }
 
     pub(super) fn figures_of(&self, details: &Details) -> ErrorFigures {
@@ -366,28 +370,25 @@ impl<'a> SampleSet<'a> {
     }
 
     /// Draws every frame at every offset.
-    fn details(&self, fragment: &Program) -> (Details, Work) {
+    fn details(&self, programs: &Programs) -> (Details, Work) {
         let output = self.stand.scene.output;
         let results: Vec<_> = self
             .frames
             .par_iter()
-            .map(|frame| (frame.view(), frame.measure(fragment, output)))
+            .map(|frame| (frame.view(), frame.measure(programs, output)))
             .collect();
-        let mut lanes = 0;
-        let mut work = Work::default();
-        for profile in results.iter().flat_map(|(_, (_, profile))| profile) {
-            lanes += profile.lanes;
-            work += profile.work;
+        let mut all = Executed::default();
+        for (_, (_, executed)) in &results {
+            all.fragments += executed.fragments;
+            all.work += executed.work;
+            all.drawn += executed.drawn;
+            all.at_vertices += executed.at_vertices;
         }
+        let mut work = all.work * (1.0 / all.fragments.max(1) as f64);
+        work.moved = programs.handing_over + all.at_vertices / all.drawn.max(1) as f64;
         let frames = results.into_iter().map(|(view, (error, _))| (view, error));
-        (Details::new(frames), work * (1.0 / lanes.max(1) as f64))
+        (Details::new(frames), work)
     }
-}
-
-pub(super) fn compile(shader: &Shader, probes: &[Handle<Expression>]) -> Result<Program, Refused> {
-    // A shader always has a fragment stage.
-    let entry = shader.index(Stage::Fragment).unwrap_or(0);
-    Program::compile(shader.module(), entry, probes)
 }
 
 /// Where in a pixel pictures are sampled, from its centre, in pixels, -0.5..0.5: `count` points spread evenly over

@@ -20,6 +20,7 @@ fn coverage(depths: [f32; 3]) -> Coverage {
         depths: [0.0; LANES],
         draw: 0,
         first: 0,
+        quads: Vec::new(),
         recall: None,
     };
     for ((lane, pixel), depth) in [(0, 0), (1, 1), (4, 0)].into_iter().zip(depths) {
@@ -32,6 +33,7 @@ fn coverage(depths: [f32; 3]) -> Coverage {
         grid: 1,
         blocks: vec![block],
         fragments: 3,
+        drawn: 3,
         slots: Vec::new(),
         late: true,
         states: Arc::default(),

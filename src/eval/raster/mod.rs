@@ -10,6 +10,7 @@
 //! `less` against a buffer of f32 cleared to 1; nothing is culled; front faces are counter-clockwise on screen.
 //! Positions are snapped to 1/256 pixel for coverage (top-left rule) and exact for interpolation.
 
+mod more;
 mod part;
 mod quads;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod tests;
 mod triangle;
 mod vertices;
 
+pub(crate) use quads::Quad;
 #[cfg(feature = "gpu")]
 pub(crate) use vertices::attribute;
 
@@ -95,6 +97,8 @@ pub struct Coverage {
     pub blocks: Vec<Block>,
     /// How many fragments are covered, in all blocks.
     pub fragments: usize,
+    /// The same in the whole picture, where this is a part of it.
+    pub drawn: usize,
     /// What each word of [`Block::inputs`] is: the fragment program's inputs.
     pub slots: Vec<Slot>,
     /// Whether fragments hide each other only after shading, since the shader may discard them or move their
@@ -125,6 +129,8 @@ pub struct Block {
     pub draw: usize,
     /// The place of the first covered fragment among all of [`Coverage::fragments`].
     pub first: usize,
+    /// Where its quads are, in their order.
+    pub(crate) quads: Vec<Quad>,
     /// What is remembered of the textures between the programs that are run over it.
     pub recall: Option<Arc<Recall>>,
 }
@@ -197,6 +203,7 @@ fn cover(
         grid: target.grid,
         blocks,
         fragments,
+        drawn: fragments,
         slots: inputs.to_vec(),
         late,
         states: states.clone(),

@@ -53,10 +53,12 @@ impl Coverage {
                         depths: [0.0; LANES],
                         draw: block.draw,
                         first: fragments,
+                        quads: Vec::new(),
                         recall: None,
                     };
                     (empty, 0)
                 });
+                target.quads.extend(block.quads.get(quad / 4).copied());
                 let to = *at..*at + 4;
                 for (words, from) in target.inputs.iter_mut().zip(&block.inputs) {
                     words[to.clone()].copy_from_slice(&from[quad..quad + 4]);

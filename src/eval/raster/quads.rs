@@ -13,9 +13,10 @@ use std::ops::Range;
 const TILE: u32 = 16;
 
 /// 2 x 2 fragments of one triangle.
-pub(super) struct Quad {
-    /// Its place among the triangles given.
-    triangle: u32,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quad {
+    /// Its place among the triangles given; in a [`Block`] among those of the block's draw.
+    pub(super) triangle: u32,
     /// Its top-left pixel; both are even.
     x: u32,
     y: u32,
@@ -129,7 +130,7 @@ pub(super) fn blocks(
     inputs: &[Slot],
     target: &Target,
 ) -> Vec<Block> {
-    let sources: Vec<Source> = inputs.iter().map(|s| Source::of(s, outputs)).collect();
+    let sources = sources(inputs, outputs);
     let mut blocks: Vec<Block> = draws
         .par_iter()
         .enumerate()
@@ -149,7 +150,13 @@ pub(super) fn blocks(
     blocks
 }
 
-fn block(
+/// Where the inputs of a fragment program come from, of a vertex program's outputs among others.
+pub(super) fn sources(inputs: &[Slot], outputs: &[Slot]) -> Vec<Source> {
+    inputs.iter().map(|s| Source::of(s, outputs)).collect()
+}
+
+/// A block of quads, with the inputs that come from the sources.
+pub(super) fn block(
     quads: &[Quad],
     draw: usize,
     triangles: &[Triangle],
@@ -165,6 +172,7 @@ fn block(
         depths: [0.0; LANES],
         draw,
         first: 0,
+        quads: Vec::with_capacity(quads.len()),
         recall: None,
     };
     let linear = sources
@@ -172,6 +180,10 @@ fn block(
         .any(|s| matches!(s, Source::Linear(_) | Source::Barycentric(_, false)));
     for (i, quad) in quads.iter().enumerate() {
         let triangle = &triangles[quad.triangle as usize];
+        block.quads.push(Quad {
+            triangle: triangle.index,
+            ..*quad
+        });
         let bit = i % 16 * 4;
         block.active.0[i / 16] |= 15 << bit;
         block.covered.0[i / 16] |= u64::from(quad.mask) << bit;
@@ -246,7 +258,7 @@ fn blend(values: [f64; 3], weights: [f64; 3]) -> u32 {
 }
 
 /// Where a word of the fragment program's input comes from.
-enum Source {
+pub(super) enum Source {
     /// A vertex output by its slot, interpolated.
     Perspective(usize),
     Linear(usize),

@@ -19,23 +19,30 @@ pub(super) struct Vertices {
 
 /// Runs the program over all vertices of the frame's mesh, in order.
 pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
+    let draws = frame.mesh.draws().into_iter();
+    let all: Vec<Vec<usize>> = draws.map(|draw| draw.vertices.collect()).collect();
+    run_some(program, frame, &all)
+}
+
+/// Runs the program over some vertices of each draw of the frame's mesh; what is made of them comes in the same order, draw
+/// by draw.
+pub(super) fn run_some(program: &Program, frame: &Frame, chosen: &[Vec<usize>]) -> Vertices {
     let mesh = &*frame.mesh;
-    let count = mesh.positions.len();
+    let count = chosen.iter().map(Vec::len).sum();
     let mut outputs = vec![Vec::with_capacity(count); program.outputs().len()];
     let mut profile: Option<Profile> = None;
     let mut inputs = vec![[0; LANES]; program.inputs().len()];
     let mut block = vec![[0; LANES]; program.outputs().len()];
-    for (index, draw) in mesh.draws().into_iter().enumerate() {
+    for (index, (draw, chosen)) in mesh.draws().into_iter().zip(chosen).enumerate() {
         let mut machine = Machine::of_draw(program, &frame.bindings, index);
-        for first in draw.vertices.clone().step_by(LANES) {
-            let lanes = (draw.vertices.end - first).min(LANES);
+        for vertices in chosen.chunks(LANES) {
             for (words, slot) in inputs.iter_mut().zip(program.inputs()) {
-                feed(words, slot, (first, draw.vertices.start), lanes, frame);
+                feed(words, slot, (vertices, draw.vertices.start), frame);
             }
-            let active = first_lanes(lanes);
+            let active = first_lanes(vertices.len());
             machine.run(&inputs, active, active, &mut block);
             for (all, words) in outputs.iter_mut().zip(&block) {
-                all.extend_from_slice(&words[..lanes]);
+                all.extend_from_slice(&words[..vertices.len()]);
             }
         }
         match &mut profile {
@@ -58,28 +65,22 @@ pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
     }
 }
 
-/// Fills one input for the vertices from `first`, of a draw that begins at `start`.
-fn feed(
-    words: &mut Words,
-    slot: &Slot,
-    (first, start): (usize, usize),
-    lanes: usize,
-    frame: &Frame,
-) {
+/// Fills one input for some vertices, of a draw that begins at `start`.
+fn feed(words: &mut Words, slot: &Slot, (vertices, start): (&[usize], usize), frame: &Frame) {
     let location = match slot.binding {
         Binding::BuiltIn(BuiltIn::VertexIndex) => {
-            for (lane, word) in words[..lanes].iter_mut().enumerate() {
-                *word = (first - start + lane) as u32;
+            for (word, vertex) in words.iter_mut().zip(vertices) {
+                *word = (vertex - start) as u32;
             }
             return;
         }
         // One instance, and every base is 0.
-        Binding::BuiltIn(_) => return words[..lanes].fill(0),
+        Binding::BuiltIn(_) => return words[..vertices.len()].fill(0),
         Binding::Location { location, .. } => location,
     };
-    for (lane, word) in words[..lanes].iter_mut().enumerate() {
+    for (word, vertex) in words.iter_mut().zip(vertices) {
         let fed = (location, slot.component);
-        *word = self::attribute(frame, fed, slot.kind, first + lane);
+        *word = self::attribute(frame, fed, slot.kind, *vertex);
     }
 }
 
