@@ -50,12 +50,37 @@ fn written(module: &naga::Module) -> Option<String> {
     Some(naga::back::wgsl::write_string(module, &info, flags).expect("it is WGSL"))
 }
 
+/// Whether a constant is one that nothing is taken out of: naga writes no other as the initial value of a variable in
+/// SPIR-V.
+fn is_plain(function: &naga::Function, value: naga::Handle<naga::Expression>) -> bool {
+    use naga::Expression as E;
+    match &function.expressions[value] {
+        E::Literal(_) | E::ZeroValue(_) | E::Constant(_) => true,
+        E::Splat { value, .. } => is_plain(function, *value),
+        E::Compose { components, .. } => components.iter().all(|c| is_plain(function, *c)),
+        _ => false,
+    }
+}
+
 fn check(name: &str, source: &str) {
     let module = naga::front::wgsl::parse_str(source)
         .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
     let Some(shader) = normal_form(&module) else {
         return;
     };
+    for stage in [Stage::Vertex, Stage::Fragment] {
+        let Some(function) = shader.function(stage) else {
+            continue;
+        };
+        for (_, local) in function.local_variables.iter() {
+            let plain = local.init.is_none_or(|init| is_plain(function, init));
+            assert!(
+                plain,
+                "{name}: not every writer takes how {:?} begins",
+                local.name
+            );
+        }
+    }
     let valid = shader.validate();
     valid.unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
     let again = normal_form(shader.module()).expect("it has a fragment entry point");

@@ -233,12 +233,7 @@ impl Splitter<'_> {
         let variable = &self.old.local_variables[local];
         if !whole {
             for (index, part) in self.tree.nodes[node].parts.clone().into_iter().enumerate() {
-                let init = init.map(|base| {
-                    let index = index as u32;
-                    self.origins.push(None);
-                    let part = Expression::AccessIndex { base, index };
-                    self.new.append(part, Span::UNDEFINED)
-                });
+                let init = init.map(|whole| self.part(whole, index, self.tree.nodes[part].ty));
                 self.variables(part, init);
             }
             return;
@@ -285,6 +280,39 @@ impl Splitter<'_> {
         });
         self.origins.push(Some(old));
         self.new.append(copy, self.old.expressions.get_span(old))
+    }
+
+    /// A part of an initial value, of that type. Not every writer takes constants apart where a variable is made, so it
+    /// is done here.
+    fn part(
+        &mut self,
+        whole: Handle<Expression>,
+        index: usize,
+        ty: Handle<Type>,
+    ) -> Handle<Expression> {
+        let part = match &self.new[whole] {
+            Expression::Compose { components, .. } => return components[index],
+            Expression::ZeroValue(_) => Expression::ZeroValue(ty),
+            Expression::Constant(constant) => {
+                let whole = self.tree.module.constants[*constant].init;
+                let whole = self.constant(whole);
+                return self.part(whole, index, ty);
+            }
+            _ => Expression::AccessIndex {
+                base: whole,
+                index: index as u32,
+            },
+        };
+        self.origins.push(None);
+        self.new.append(part, Span::UNDEFINED)
+    }
+
+    /// A copy of a constant of the module.
+    fn constant(&mut self, value: Handle<Expression>) -> Handle<Expression> {
+        let expressions = &self.tree.module.global_expressions;
+        let copy = operands::map(&expressions[value], |operand| self.constant(operand));
+        self.origins.push(None);
+        self.new.append(copy, expressions.get_span(value))
     }
 
     /// The pointer to a variable that is not split further.
