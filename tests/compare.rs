@@ -496,8 +496,8 @@ mod on_a_gpu {
         }
     }
 
-    /// A forward material, and a deferred one.
-    const MATERIALS: [(&str, &[(&str, &str)]); 2] = [
+    /// A forward material, a deferred one, and one that is blended.
+    const MATERIALS: [(&str, &[(&str, &str)]); 3] = [
         (
             "terrain_blend",
             &[
@@ -512,29 +512,14 @@ mod on_a_gpu {
                 "vec2f(0.0)",
             )],
         ),
+        (
+            "ivy",
+            &[
+                ("return alpha * left;", "return 0.6 * left;"),
+                ("0.3 * (slope.x + slope.y)", "0.0"),
+            ],
+        ),
     ];
-
-    #[test]
-    fn blended_surfaces_are_refused_on_a_gpu() {
-        if !has_adapter() {
-            return;
-        }
-        let folder = small(
-            "blended",
-            "terrain_blend",
-            "resolution = [8, 8]\nlevels = 2\nblend = \"alpha\"",
-        );
-        let request = CompareRequest {
-            other: folder.join("a.wgsl"),
-            renderer: DrawnBy::Gpu { adapter: None },
-            ..request(&folder)
-        };
-        let error = compare(&request, &|| {}).unwrap_err();
-        assert!(
-            error.message.contains("blended") && !error.notes.is_empty(),
-            "{error}"
-        );
-    }
 
     #[test]
     fn a_comparison_on_a_gpu_has_a_process_of_its_own() {

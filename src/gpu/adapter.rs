@@ -165,11 +165,9 @@ impl Gpu {
         }));
         let lost: Arc<Mutex<Option<String>>> = Arc::default();
         let keep = lost.clone();
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                let mut first = keep.lock().unwrap_or_else(PoisonError::into_inner);
-                first.get_or_insert(message);
-            }
+        device.set_device_lost_callback(move |_, message| {
+            let mut first = keep.lock().unwrap_or_else(PoisonError::into_inner);
+            first.get_or_insert(message);
         });
         Ok(Self {
             label,
@@ -222,6 +220,16 @@ impl Gpu {
         self.device.features().contains(needed) && features.allowed_usages.contains(usages)
     }
 
+    /// Whether the device was lost, so that nothing more can be done on it: another one may be opened.
+    pub fn is_lost(&self) -> bool {
+        self.why_lost().is_some()
+    }
+
+    fn why_lost(&self) -> Option<String> {
+        let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
+        lost.clone()
+    }
+
     /// Does something on the device; what goes wrong there is an error. `what` says what was being done:
     /// "compiling the shader".
     pub(super) fn guarded<T>(&self, what: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
@@ -239,8 +247,7 @@ impl Gpu {
                 .unwrap_or_else(PoisonError::into_inner)
                 .take(),
         ];
-        let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(message) = &*lost {
+        if let Some(message) = self.why_lost() {
             return Err(self
                 .failed(what, "the device was lost")
                 .with_reason(message.trim())
@@ -298,6 +305,23 @@ mod tests {
             ("radeon", false),
         ] {
             assert_eq!(label.matches(name), found, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_is_lost_is_an_error_with_a_way_out() {
+        for label in list() {
+            let gpu = Gpu::open(Some(&label.to_string())).unwrap();
+            assert!(!gpu.is_lost());
+            gpu.device.destroy();
+            // It is told of when the device is looked at the next time, whatever that finds.
+            let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
+            let error = gpu.guarded("drawing", || Ok(())).unwrap_err();
+            assert!(
+                gpu.is_lost() && error.message.contains("the device was lost"),
+                "{error}"
+            );
+            assert!(!error.notes.is_empty(), "{error}");
         }
     }
 

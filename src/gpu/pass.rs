@@ -346,6 +346,8 @@ fn settled(
     let (mut module, at) = without_overrides(module, at, auto_lod)?;
     if gpu.is_opengl() {
         opengl::load_depths(&mut module);
+        let info = validated(&module)?;
+        opengl::divide_whole_numbers(&mut module, &info);
     }
     if gpu.inlines_uniforms() {
         lavapipe::hide_uniforms(&mut module, place);

@@ -348,7 +348,10 @@ impl Uploads {
         let buffers = Buffers {
             vertices: (layout.stride() > 0)
                 .then(|| make(layout.bytes(frame), BufferUsages::VERTEX)),
-            indices: make(vertices::indices(frame), BufferUsages::INDEX),
+            indices: make(
+                vertices::indices(frame, gpu.is_opengl()),
+                BufferUsages::INDEX,
+            ),
         };
         self.meshes.push(Uploaded {
             mesh: frame.mesh.clone(),

@@ -116,15 +116,20 @@ fn format(input: &Input) -> VertexFormat {
     formats[input.components - 1]
 }
 
-/// The corners of all triangles, counted from the first vertex of their draw.
-pub(super) fn indices(frame: &Frame) -> Vec<u8> {
+/// The corners of all triangles, counted from the first vertex of their draw. A flat input of a fragment is that of
+/// its triangle's first corner, or, where `last_is_flat`, of the last one: there each first corner comes last.
+pub(super) fn indices(frame: &Frame, last_is_flat: bool) -> Vec<u8> {
     let mesh = &frame.mesh;
     let mut bytes = Vec::new();
     for draw in mesh.draws() {
         let corners = 3 * draw.triangles.start..3 * draw.triangles.end;
-        for corner in mesh.indices.get(corners).unwrap_or_default() {
-            let own = corner.saturating_sub(draw.vertices.start as u32);
-            bytes.extend_from_slice(&own.to_le_bytes());
+        let corners = mesh.indices.get(corners).unwrap_or_default();
+        for [a, b, c] in corners.as_chunks::<3>().0 {
+            let corners = if last_is_flat { [b, c, a] } else { [a, b, c] };
+            for corner in corners {
+                let own = corner.saturating_sub(draw.vertices.start as u32);
+                bytes.extend_from_slice(&own.to_le_bytes());
+            }
         }
     }
     bytes

@@ -44,7 +44,7 @@ impl Scene {
     }
 
     /// Hands a level of detail to the uniforms that stand for it, if the shader has one.
-    pub(crate) fn set_auto_lod(&mut self, auto_lod: f64) {
+    pub fn set_auto_lod(&mut self, auto_lod: f64) {
         let pose = self.pose(glam::DVec3::Z, self.nearest);
         for buffer in &mut self.buffers {
             if !buffer.has_auto_lod() {

@@ -323,6 +323,12 @@ mod tests {
             assert!(std::env::var_os("CI").is_none(), "{absent}");
             eprintln!("SKIPPED: sums of errors on a device: {absent}");
         }
+        if std::env::var_os("CI").is_some() {
+            for backend in ["Vulkan", "OpenGL"] {
+                let found = labels.iter().any(|label| label.backend == backend);
+                assert!(found, "no adapter of {backend} among {labels:?}");
+            }
+        }
         let open = |label: &AdapterLabel| Gpu::open(Some(&label.to_string())).unwrap();
         labels.iter().map(open).collect()
     }

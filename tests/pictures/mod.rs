@@ -165,6 +165,12 @@ impl Apart {
         self.differences.get(at).copied().unwrap_or(f32::NAN)
     }
 
+    /// The share of those that are no larger.
+    fn within(&self, step: f32) -> f64 {
+        let count = self.differences.partition_point(|d| *d <= step);
+        count as f64 / self.differences.len().max(1) as f64
+    }
+
     fn edges(&self) -> f64 {
         300.0 * self.edges as f64 / self.differences.len().max(1) as f64
     }
@@ -174,7 +180,8 @@ impl Apart {
         assert!(self.differences.len() > 1000, "{what}: nothing to see");
         let (mean, most, worst) = (self.mean(), self.most(DECISIONS), self.most(0.0));
         let line = format!(
-            "{what}: mean {mean:.1e}, 999 in 1000 within {most:.4}, all within {worst:.4}, edges {:.2} in 100",
+            "{what}: mean {mean:.1e}, 999 in 1000 within {most:.4}, all within {worst:.4}, {:.1} in 100 within 1/255, edges {:.2} in 100",
+            100.0 * self.within(STEP),
             self.edges()
         );
         println!("{line}");

@@ -39,6 +39,9 @@ pub fn serve(from: impl Read + Send + 'static, mut to: impl Write) -> std::io::R
         }
         if let Some((name, gpu)) = &opened {
             next = with_adapter(gpu, name, request, &requests, &mut to)?;
+            if gpu.is_lost() {
+                opened = None;
+            }
         }
     }
     Ok(())
@@ -77,7 +80,7 @@ fn requests(mut from: impl Read + Send + 'static) -> Requests {
     Requests { receive, busy }
 }
 
-/// Answers requests for one adapter; gives the first that is for another.
+/// Answers requests for one adapter; gives the first that is for another, or that comes after the device was lost.
 fn with_adapter(
     gpu: &Gpu,
     name: &Option<String>,
@@ -88,7 +91,7 @@ fn with_adapter(
     let mut subject: Option<Loaded<'_>> = None;
     let mut next = Some(first);
     while let Some(request) = next.take() {
-        if request.adapter != *name {
+        if request.adapter != *name || gpu.is_lost() {
             return Ok(Some(request));
         }
         match answer(gpu, &mut subject, &request) {
