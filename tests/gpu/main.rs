@@ -9,6 +9,7 @@ mod blended;
 #[path = "../fixtures/mod.rs"]
 mod fixtures;
 mod levels;
+mod models;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod shaders;

@@ -128,8 +128,13 @@ fn what_cannot_be_drawn_is_said_with_a_way_out() {
         grid: 4096,
         ..WANTED
     };
-    let error = refused("vulkan", &subject, huge);
-    assert!(error.contains("drawing"), "{error}");
+    let blended = written("huge", PLAIN, "blend = \"alpha\"");
+    for subject in [&subject, &blended] {
+        for interface in INTERFACES {
+            let error = refused(interface, subject, huge);
+            assert!(error.contains("drawing"), "{error}");
+        }
+    }
 }
 
 /// lodc with so little memory that a large picture does not fit.
