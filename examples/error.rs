@@ -12,7 +12,7 @@ use lodc::eval::program::Program;
 use lodc::eval::raster::{Frame, rasterize};
 use lodc::front::Source;
 use lodc::scene::Scene;
-use lodc::search::{Stand, find};
+use lodc::search::{Kept, Scope, Stand, find};
 use lodc_passes::{Shader, Stage};
 use std::error::Error;
 use std::path::Path;
@@ -48,7 +48,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         vertex: &vertex,
         scene: &scene,
     };
-    let found = find(&stand, &|_| {}).map_err(|refused| refused.what.clone())?;
+    let wanted = (Scope::None, &Kept::default());
+    let found = find(&stand, wanted, &|_| {}).map_err(|refused| refused.what.clone())?;
     let level = level.parse().ok().and_then(|i: usize| found.levels.get(i));
     let level = level.ok_or("there is no such level")?;
     let frame = scene.frames(level.distance).swap_remove(0);

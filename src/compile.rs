@@ -6,7 +6,11 @@
 #[cfg(feature = "search")]
 mod compare;
 #[cfg(feature = "search")]
+mod directives;
+#[cfg(feature = "search")]
 mod init;
+#[cfg(feature = "search")]
+mod kept;
 #[cfg(feature = "search")]
 mod search;
 mod snapshot;
@@ -49,6 +53,11 @@ pub struct Request {
     pub form: Option<Form>,
     /// The language to write; by default that of the lock when it is replayed, else [`Target::Wgsl`].
     pub target: Option<Target>,
+    /// Which shaders are made exact first.
+    #[cfg(feature = "search")]
+    pub exact: crate::search::Scope,
+    /// What is never folded, simplified or left out: uniforms, textures, values, functions.
+    pub keep: Vec<String>,
     /// The command that reproduces the result, for the report.
     pub command: String,
 }

@@ -189,7 +189,15 @@ impl Recipe {
     /// # Errors
     /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
     pub fn replay(&self, base: &Shader) -> Result<Shader, Box<ReplayError>> {
-        let mut shader = base.clone();
+        self.replay_from(base, base)
+    }
+
+    /// As [`replay`](Self::replay), but on a shader that another recipe has made of the base.
+    ///
+    /// # Errors
+    /// As `replay`.
+    pub fn replay_from(&self, start: &Shader, base: &Shader) -> Result<Shader, Box<ReplayError>> {
+        let mut shader = start.clone();
         for (step, candidate) in self.0.iter().enumerate() {
             shader = apply(&shader, &candidate.known_to(base)).map_err(|declined| {
                 Box::new(ReplayError {

@@ -7,6 +7,7 @@ mod progress;
 use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request, SnapshotRequest};
 use crate::emit::{self, Form, Target};
 use crate::front::{Definition, Modules, Stages};
+use crate::search::Scope;
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
 use lodc_passes::autolod::BoundReading;
@@ -196,6 +197,23 @@ struct CompileArgs {
     /// paper reads it [default: the scene's, else excess]
     #[arg(long, value_name = "excess|paper", value_parser = reading)]
     bound: Option<BoundReading>,
+    /// Leaves out of the levels what the scene does not need, before anything that costs error
+    #[arg(
+        long,
+        value_name = "BOOL",
+        action = clap::ArgAction::Set,
+        default_value_t = true,
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "true"
+    )]
+    exact: bool,
+    /// Leaves it out of level 0 too
+    #[arg(long)]
+    specialize: bool,
+    /// A uniform, texture, value or function that is never folded, simplified or left out; as often as wanted
+    #[arg(long, value_name = "NAME")]
+    keep: Vec<String>,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
@@ -408,6 +426,18 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.bound = arguments.bound;
     request.form = arguments.form;
     request.target = arguments.target;
+    request.exact = match (arguments.specialize, arguments.exact) {
+        (true, true) => Scope::All,
+        (false, true) => Scope::Levels,
+        (false, false) => Scope::None,
+        (true, false) => {
+            return Err(
+                Diagnostic::error("`--specialize` asks for what `--exact=false` forbids")
+                    .with_note("leave one of them out"),
+            );
+        }
+    };
+    request.keep = arguments.keep;
     request.command = command_line();
     let quiet = arguments.quiet;
     if arguments.locked {

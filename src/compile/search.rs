@@ -191,13 +191,15 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         vertex: &vertex,
         scene: &ready.scene,
     };
-    let found = search::find(&stand, progress).map_err(|refused| refused.at(&ready.source))?;
+    let kept = ready.kept(&request.keep)?;
+    let found = search::find(&stand, (request.exact, &kept), progress)
+        .map_err(|refused| refused.at(&ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     let levels: Vec<EmitLevel> = found
         .levels
         .iter()
         .zip(&says)
-        .skip(1)
+        .filter(|(level, _)| !level.is_original)
         .map(emit_level)
         .collect();
 
@@ -237,10 +239,10 @@ fn emit_level((level, says): (&Level, &String)) -> EmitLevel {
 
 impl Ready {
     fn says(&self, level: &Level) -> String {
-        if level.recipe.0.is_empty() {
-            "the original".to_owned()
-        } else {
-            emit::says(&level.recipe, &self.source.fragment)
+        match level.recipe.0.is_empty() {
+            true if level.is_original => "the original".to_owned(),
+            true => "the same picture, without what the scene does not need".to_owned(),
+            false => emit::says(&level.recipe, &self.source.fragment),
         }
     }
 
@@ -385,10 +387,14 @@ impl Ready {
             bound: self.scene.reading,
             seed: self.scene.seed,
             rho0: figure(found.rho0),
+            exact: match levels.is_empty() {
+                true => Recipe::default(),
+                false => found.exact.recipe.clone(),
+            },
             levels: found
                 .levels
                 .iter()
-                .skip(1)
+                .filter(|level| !level.is_original)
                 .zip(levels)
                 .map(|(level, emitted)| emit::LockedLevel {
                     autolod: emitted.autolod,

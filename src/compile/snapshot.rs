@@ -106,7 +106,7 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
     request.spare(&files, &[request.shader.clone(), request.lock()])?;
     let before = at.checked_sub(1).and_then(|before| levels.get(before));
     Ok(Snapshot {
-        level: at,
+        level: emit::number(levels, at),
         range: (
             before.map_or(0.0, |level| level.autolod),
             levels.get(at).map(|level| level.autolod),

@@ -11,7 +11,7 @@ use super::{EmitLevel, Output};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Candidate, PASSES, Recipe, Shader};
+use lodc_passes::{Candidate, PASSES, Recipe, ReplayError, Shader};
 use serde::Deserialize;
 use std::fmt::Write;
 use std::ops::Range;
@@ -42,7 +42,9 @@ pub struct Lock {
     pub seed: u64,
     /// Pixels on screen per object unit at the nearest distance, where autoLOD is 0.
     pub rho0: f64,
-    /// The levels below the original, nearest first.
+    /// What costs no error: done to the original before the recipe of every level.
+    pub exact: Recipe,
+    /// The levels, nearest first: those below the original, and one at autoLOD 0 where something takes its place.
     pub levels: Vec<LockedLevel>,
 }
 
@@ -111,7 +113,7 @@ pub struct LockedLevel {
     pub cost: f64,
     /// What changed, for people.
     pub says: String,
-    /// What is done to the original.
+    /// What is done to the original, after what is exact.
     pub recipe: Recipe,
 }
 
@@ -192,6 +194,13 @@ impl Lock {
             }
             line("]".to_owned());
         }
+        if !self.exact.0.is_empty() {
+            line("exact = [".to_owned());
+            for candidate in &self.exact.0 {
+                line(format!("  {},", step(candidate)));
+            }
+            line("]".to_owned());
+        }
         for level in &self.levels {
             line(String::new());
             line("[[level]]".to_owned());
@@ -260,19 +269,17 @@ impl Lock {
             let before = levels
                 .last()
                 .map_or(0.0, |level: &LockedLevel| level.autolod);
-            if !(*level.autolod.get_ref() > before && level.autolod.get_ref().is_finite()) {
+            let start = *level.autolod.get_ref();
+            let is_zero = start == 0.0 && levels.is_empty();
+            if !((start > before || is_zero) && start.is_finite()) {
                 return Err(at(
-                    format!("a level starts at autoLOD {}", level.autolod.get_ref()),
+                    format!("a level starts at autoLOD {start}"),
                     level.autolod.span(),
                     &format!("has to be above {before}"),
                 )
-                .with_note("thresholds rise from level to level, and the first is above 0"));
+                .with_note("thresholds rise from level to level"));
             }
-            let recipe = level
-                .recipe
-                .into_iter()
-                .map(|step| step.into_inner().candidate(&at))
-                .collect::<Result<Vec<_>>>()?;
+            let recipe = recipe(level.recipe, &at)?;
             levels.push(LockedLevel {
                 autolod: level.autolod.into_inner(),
                 distance: level.distance,
@@ -281,7 +288,7 @@ impl Lock {
                 bound: level.bound,
                 cost: level.cost,
                 says: level.says,
-                recipe: Recipe(recipe),
+                recipe,
             });
         }
         Ok(Self {
@@ -311,6 +318,7 @@ impl Lock {
             bound: raw.bound,
             seed: raw.seed,
             rho0: raw.rho0,
+            exact: recipe(raw.exact, &at)?,
             levels,
         })
     }
@@ -340,27 +348,31 @@ impl Lock {
                 self.source.file
             )));
         }
+        let fails = |failed: Box<ReplayError>, level: Option<usize>| {
+            let (step, of) = (failed.step + 1, level.map(|at| self.number(at)));
+            let of = of.map_or_else(|| "of what is exact".into(), |n| format!("of level {n}"));
+            let error = Diagnostic::error(format!(
+                "step {step} {of} no longer applies: {}",
+                failed.candidate
+            ))
+            .with_source(name, text);
+            let error = match place(text, level, failed.step) {
+                Some(span) => error.with_label(span, failed.declined.0),
+                None => error.with_reason(failed.declined.0),
+            };
+            error.with_note(format!(
+                "make the lock again: run lodc on {} without `--locked`",
+                self.source.file
+            ))
+        };
+        let start = self.exact.replay(base);
+        let start = start.map_err(|failed| fails(failed, None))?;
         self.levels
             .iter()
             .enumerate()
             .map(|(at, level)| {
-                let shader = level.recipe.replay(base).map_err(|failed| {
-                    let error = Diagnostic::error(format!(
-                        "step {} of level {} no longer applies: {}",
-                        failed.step + 1,
-                        at + 1,
-                        failed.candidate
-                    ))
-                    .with_source(name, text);
-                    let error = match place(text, at, failed.step) {
-                        Some(span) => error.with_label(span, failed.declined.0),
-                        None => error.with_reason(failed.declined.0),
-                    };
-                    error.with_note(format!(
-                        "make the lock again: run lodc on {} without `--locked`",
-                        self.source.file
-                    ))
-                })?;
+                let shader = level.recipe.replay_from(&start, base);
+                let shader = shader.map_err(|failed| fails(failed, Some(at)))?;
                 Ok(EmitLevel {
                     autolod: level.autolod,
                     shader,
@@ -372,6 +384,21 @@ impl Lock {
             })
             .collect()
     }
+}
+
+impl Lock {
+    /// The number of a level: the first is 0 when it takes the place of the original.
+    fn number(&self, at: usize) -> usize {
+        let first = self.levels.first();
+        at + usize::from(first.is_none_or(|level| level.autolod > 0.0))
+    }
+}
+
+/// A recipe as it was read.
+fn recipe(steps: Vec<Spanned<RawStep>>, at: &Located<'_>) -> Result<Recipe> {
+    let steps = steps.into_iter();
+    let steps = steps.map(|step| step.into_inner().candidate(at));
+    Ok(Recipe(steps.collect::<Result<_>>()?))
 }
 
 /// One step of a recipe as an inline table.
@@ -424,10 +451,14 @@ fn string(text: &str) -> String {
     toml::Value::String(text.replace(['\n', '\r'], " ")).to_string()
 }
 
-/// Where a step of a level's recipe is.
-fn place(text: &str, level: usize, step: usize) -> Option<Range<usize>> {
+/// Where a step of a level's recipe is, or one of what is exact.
+fn place(text: &str, level: Option<usize>, step: usize) -> Option<Range<usize>> {
     let raw: RawLock = toml::from_str(text).ok()?;
-    Some(raw.level.get(level)?.recipe.get(step)?.span())
+    let recipe = match level {
+        Some(level) => &raw.level.get(level)?.recipe,
+        None => &raw.exact,
+    };
+    Some(recipe.get(step)?.span())
 }
 
 fn read<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T> {
@@ -468,6 +499,8 @@ struct RawLock {
     bound: BoundReading,
     seed: u64,
     rho0: f64,
+    #[serde(default)]
+    exact: Vec<Spanned<RawStep>>,
     #[serde(default)]
     level: Vec<RawLevel>,
 }
@@ -604,6 +637,7 @@ mod tests {
             bound: BoundReading::Paper,
             seed: u64::from(u32::MAX) + 7,
             rho0: 211.34,
+            exact: Recipe::default(),
             levels: vec![
                 LockedLevel {
                     autolod: 0.1,
@@ -644,7 +678,8 @@ mod tests {
 
     #[test]
     fn what_was_written_reads_the_same() {
-        let lock = lock();
+        let mut lock = lock();
+        lock.exact = Recipe(vec![lock.levels[0].recipe.0[1].clone()]);
         let text = lock.to_toml();
         assert_eq!(
             Lock::parse("brick.lod.toml", &text).expect("it reads"),
@@ -810,7 +845,7 @@ mod tests {
     #[test]
     fn places_of_steps_are_found() {
         let text = lock().to_toml();
-        let span = place(&text, 0, 1).expect("it is there");
+        let span = place(&text, Some(0), 1).expect("it is there");
         assert!(text[span].contains("texture-removal"));
     }
 }

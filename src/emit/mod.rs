@@ -23,7 +23,7 @@ mod source;
 mod splice;
 mod targets;
 mod tidy;
-mod tokens;
+pub(crate) mod tokens;
 mod varyings;
 mod vertex;
 mod write;
@@ -110,10 +110,10 @@ pub struct Output {
     pub target: Target,
 }
 
-/// A level below the original: a variant, and from where it is used. The figures are for people.
+/// A level: a variant, and from where it is used. The figures are for people.
 #[derive(Clone, Debug)]
 pub struct EmitLevel {
-    /// The autoLOD from which it is used: above 0, and above that of the level before.
+    /// The autoLOD from which it is used, above that of the level before; 0 for one that takes the place of the original.
     pub autolod: f32,
     /// The variant, in normal form.
     pub shader: Shader,
@@ -170,8 +170,9 @@ pub fn emit_as(
         }
         Form::Files => {
             let mut files = Vec::new();
-            for number in 0..=levels.len() {
-                let text = level_alone(source, levels, number, stem)?;
+            for at in usize::from(at_zero(levels).0.is_some())..=levels.len() {
+                let text = level_alone(source, levels, at, stem)?;
+                let number = number(levels, at);
                 files.extend(written(format!("{stem}.lod{number}"), text)?);
             }
             Ok(files)
@@ -196,38 +197,51 @@ fn written(
     }
 }
 
-/// One level as a shader of its own, 0 being the original: as it is read back, and the files that it is. `stem` begins the
-/// name of the lock, and `name` those of the files.
+/// One level as a shader of its own, the original being at 0 and `levels[0]` at 1: as it is read back, and the files that it is.
+/// `stem` begins the name of the lock, and `name` those of the files.
 ///
 /// # Errors
 /// As [`emit_as`], and when there is no such level.
 pub(crate) fn one_level(
     source: &Source,
     levels: &[EmitLevel],
-    number: usize,
+    at: usize,
     target: Target,
     (stem, name): (&str, &str),
 ) -> Result<(Source, Vec<(PathBuf, Vec<u8>)>)> {
     let source = &*composed::composed(source)?;
-    let text = level_alone(source, levels, number, stem)?;
+    let text = level_alone(source, levels, at, stem)?;
     let read = read_back(&text, source)?;
     let files = written(source, &read, &text, target, name)?;
     Ok((read, files))
 }
 
 /// The text of one level alone.
-fn level_alone(source: &Source, levels: &[EmitLevel], number: usize, stem: &str) -> Result<String> {
-    let level = number.checked_sub(1).and_then(|at| levels.get(at));
+fn level_alone(source: &Source, levels: &[EmitLevel], at: usize, stem: &str) -> Result<String> {
+    let level = at.checked_sub(1).and_then(|at| levels.get(at));
     match level {
-        Some(level) => alone::alone(source, number, level, stem),
+        Some(level) => alone::alone(source, number(levels, at), level, stem),
         None => Ok(source.text.clone()),
     }
 }
 
-/// Thresholds rise from above 0, so that no level hides another and NaN chooses the original.
+/// The number of a level, the original being at 0 and `levels[0]` at 1: that is 0 when it takes the place of the original.
+pub(crate) fn number(levels: &[EmitLevel], at: usize) -> usize {
+    at.saturating_sub(usize::from(at_zero(levels).0.is_some()))
+}
+
+/// The level that takes the place of the original, if one does, and the others.
+fn at_zero(levels: &[EmitLevel]) -> (Option<&EmitLevel>, &[EmitLevel]) {
+    match levels {
+        [first, rest @ ..] if first.autolod == 0.0 => (Some(first), rest),
+        _ => (None, levels),
+    }
+}
+
+/// Thresholds rise from above 0, so that no level hides another and NaN chooses level 0.
 fn check_thresholds(levels: &[EmitLevel]) -> Result<()> {
     let mut before = 0.0;
-    for (at, level) in levels.iter().enumerate() {
+    for (at, level) in at_zero(levels).1.iter().enumerate() {
         if !(level.autolod > before && level.autolod.is_finite()) {
             return Err(Diagnostic::error(format!(
                 "level {} starts at autoLOD {}, which is not above {before}",

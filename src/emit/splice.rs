@@ -7,16 +7,17 @@ use super::control::Control;
 use super::level::fragment_function;
 use super::lock::FORMAT;
 use super::print::{Item, Printed};
-use super::source::Signature;
+use super::source::{Signature, Text};
 use super::varyings::Varyings;
 use super::vertex::{VertexStage, has_own_vertex_stage};
-use super::{EmitLevel, Form, file_name};
+use super::{EmitLevel, Form, at_zero, file_name, number};
 use crate::front::Source;
 use crate::front::identifiers::{Names, in_words};
 use crate::{Diagnostic, Result};
 use lodc_passes::Shader;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::ops::Range;
 
 /// The author's text with its levels.
 pub(crate) struct Spliced {
@@ -68,14 +69,21 @@ fn spliced(
         }));
     }
 
-    let mut chosen = |name: &String| Chosen::new(body, name, levels.len(), &control, &mut names);
+    // A level at 0 takes the place of the original, which nothing calls then.
+    let zero = at_zero(levels).0;
+    let numbers = number(levels, 1)..number(levels, 1) + levels.len();
+    let mut chosen = |name: &String| Chosen::new(body, name, numbers.clone(), &control, &mut names);
     let vertex = vertex.map(&mut chosen).transpose()?;
     let fragment = chosen(&source.fragment)?;
     let stages = || vertex.iter().chain([&fragment]);
     let demoted: Vec<(&Signature, &str)> = stages()
         .map(|stage| (&stage.signature, &*stage.functions[0]))
         .collect();
-    out.push_str(&text.demoted(&demoted));
+    let authors = text.demoted(&demoted);
+    out.push_str(&match zero {
+        Some(_) => without(&authors, &fragment.functions[0], text.line_end),
+        None => authors,
+    });
     line_break(&mut out);
     out.push_str(&declaration);
 
@@ -132,7 +140,8 @@ fn spliced(
             Err(hidden) => return Ok(Err(hidden)),
         };
         let says = sentence(&level.says);
-        write!(out, "\n// Level {}. {says}\n", at + 1).ok();
+        let number = number(levels, at + 1);
+        write!(out, "\n// Level {number}. {says}\n").ok();
         if let Some(vertex) = &vertex.functions[at] {
             write!(out, "{vertex}\n").ok();
         }
@@ -160,7 +169,7 @@ impl Chosen {
     fn new(
         body: &Body<'_>,
         entry: &str,
-        levels: usize,
+        levels: Range<usize>,
         control: &Control,
         names: &mut Names,
     ) -> Result<Self> {
@@ -171,7 +180,7 @@ impl Chosen {
             )));
         };
         let original = names.take(&format!("original_{entry}"));
-        let of_levels = (1..=levels).map(|level| format!("lod_{}_{entry}", in_words(level)));
+        let of_levels = levels.map(|level| format!("lod_{}_{entry}", in_words(level)));
         let of_levels: Vec<String> = of_levels.map(|wish| names.take(&wish)).collect();
         let arguments = signature.names(&body.text).into_iter();
         let arguments = arguments.map(|name| match name == control.root {
@@ -249,12 +258,28 @@ impl Behind<'_, '_> {
     }
 }
 
+/// A text without one of its functions.
+fn without(text: &str, function: &str, line_end: &str) -> String {
+    let read = Text::new(text);
+    let Some(declaration) = read.declaration(function) else {
+        return text.to_owned();
+    };
+    let [before, after] = [
+        text[..declaration.span.start].trim_end(),
+        text[declaration.span.end..].trim_start(),
+    ];
+    match before.is_empty() || after.is_empty() {
+        true => format!("{before}{after}"),
+        false => format!("{before}{line_end}{line_end}{after}"),
+    }
+}
+
 /// The body of an entry point: what it does for the original, and for each level, by the thresholds.
 fn branches(control: &Control, levels: &[EmitLevel], bodies: &[String]) -> String {
     let mut out = String::new();
     for (at, level) in levels.iter().enumerate() {
         let [body, next] = [&bodies[at], &bodies[at + 1]];
-        if body == next {
+        if body == next || level.autolod == 0.0 {
             continue;
         }
         let test = format!("    if !({} >= {:?}) {{", control.value, level.autolod);
@@ -279,12 +304,15 @@ fn indented(text: &str, by: &str) -> String {
 fn header(source: &Source, levels: &[EmitLevel], stem: &str) -> String {
     let mut out = format!(
         "// Levels of detail of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
-         // level  autoLOD  error  cost  what changed\n\
-         // 0      0.00     -      1.00  the original\n",
+         // level  autoLOD  error  cost  what changed\n",
         file_name(source),
         stem,
     );
-    for (at, level) in levels.iter().enumerate() {
+    let (zero, above) = at_zero(levels);
+    let (cost, says) = zero.map_or((1.0, "the original"), |level| (level.cost, &*level.says));
+    let says = one_line(says);
+    writeln!(out, "// 0      0.00     -      {cost:.2}  {says}").ok();
+    for (at, level) in above.iter().enumerate() {
         writeln!(
             out,
             "// {:<5}  {:<7.2}  {:.3}  {:.2}  {}",

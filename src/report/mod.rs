@@ -4,6 +4,7 @@
 //! reads it need not ask which version wrote it.
 
 mod comparison;
+mod exact;
 mod terminal;
 
 pub use comparison::{ComparedAt, Comparison};
@@ -11,7 +12,7 @@ pub use terminal::{inspection, next, summary, table};
 
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
-use lodc_passes::{Class, PASSES, Shader, Stage, cost};
+use lodc_passes::{Class, PASSES, Recipe, Shader, Stage, cost};
 use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
@@ -33,7 +34,9 @@ pub struct Report {
     pub bound: &'static str,
     /// How many variants were measured.
     pub variants: u64,
-    /// Level 0, the original, first.
+    /// What costs no error, and is done before everything else that is done to a level; null when nothing was.
+    pub exact: Option<ExactReport>,
+    /// Level 0 first: the original, or what takes its place.
     pub levels: Vec<LevelReport>,
     /// Every variant that nothing beat in error and cost, distance by distance.
     pub frontier: Vec<FrontierReport>,
@@ -43,6 +46,32 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// What was inferred because the scene does not say it.
     pub inferences: Vec<String>,
+}
+
+/// The exact tier: what every level below the original is made from.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExactReport {
+    /// Work at the nearest distance, as a share of the original's.
+    pub cost: f64,
+    /// Arithmetic of a covered fragment there, of the original and of this, in full-rate scalar operations.
+    pub operations: [f64; 2],
+    /// Texture samples of a covered fragment there, of both.
+    pub texture_samples: [f64; 2],
+    /// The changes. Lossless: `error_after` is null.
+    pub recipe: Vec<StepReport>,
+    /// What of the interface only the original reads.
+    pub unread: Unread,
+}
+
+/// What of a shader's interface a variant of it does not read any more, by name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Unread {
+    /// Textures.
+    pub textures: Vec<String>,
+    /// Other bindings: samplers and buffers.
+    pub bindings: Vec<String>,
+    /// Inputs of the fragment stage.
+    pub varyings: Vec<String>,
 }
 
 /// A file that decided the result.
@@ -238,9 +267,13 @@ impl Report {
             pixels_per_degree: origin.pixels_per_degree,
             bound: origin.bound,
             variants: found.variants,
+            exact: exact::report(found, base, source),
             levels: found.levels.iter().zip(says).map(level).collect(),
             frontier: found.distances.iter().flat_map(frontier).collect(),
-            left_out: found.distances.iter().filter_map(withdrawn).collect(),
+            left_out: exact::left_out(found, base, source)
+                .into_iter()
+                .chain(found.distances.iter().filter_map(withdrawn))
+                .collect(),
             command: origin.command,
             seed: origin.seed,
             inputs: origin.inputs,
@@ -293,8 +326,6 @@ fn level_report(
     source: &Source,
     origin: &Origin,
 ) -> LevelReport {
-    let steps = level.recipe.0.iter().enumerate();
-    let place = |site| base.find(site).and_then(|at| place_of(base, source, at));
     LevelReport {
         autolod: level.autolod,
         distance: level.distance,
@@ -320,26 +351,33 @@ fn level_report(
             file: None,
             triangles: origin.triangles,
         },
-        recipe: steps
-            .map(|(i, candidate)| (i, candidate, place(&candidate.site)))
-            .map(|(i, candidate, place)| StepReport {
-                pass: candidate.pass.clone(),
-                site: candidate.site.to_string(),
-                choice: candidate.choice.clone(),
-                class: PASSES
-                    .iter()
-                    .find(|pass| pass.name() == candidate.pass)
-                    .map(|pass| pass.class(candidate)),
-                file: place
-                    .as_ref()
-                    .filter(|place| !place.is_in_main())
-                    .map(|place| place.file.name.to_owned()),
-                line: place.map(|place| place.line()),
-                error_after: level.error_after.get(i).copied(),
-            })
-            .collect(),
+        recipe: steps(&level.recipe, &level.error_after, base, source),
         stability: StabilityReport::default(),
     }
+}
+
+/// The steps of a recipe, each with the RMSE after it where that is known.
+fn steps(recipe: &Recipe, error_after: &[f64], base: &Shader, source: &Source) -> Vec<StepReport> {
+    let place = |site| base.find(site).and_then(|at| place_of(base, source, at));
+    let steps = recipe.0.iter().enumerate();
+    steps
+        .map(|(i, candidate)| (i, candidate, place(&candidate.site)))
+        .map(|(i, candidate, place)| StepReport {
+            pass: candidate.pass.clone(),
+            site: candidate.site.to_string(),
+            choice: candidate.choice.clone(),
+            class: PASSES
+                .iter()
+                .find(|pass| pass.name() == candidate.pass)
+                .map(|pass| pass.class(candidate)),
+            file: place
+                .as_ref()
+                .filter(|place| !place.is_in_main())
+                .map(|place| place.file.name.to_owned()),
+            line: place.map(|place| place.line()),
+            error_after: error_after.get(i).copied(),
+        })
+        .collect()
 }
 
 /// What the validation split has withdrawn at a distance.

@@ -10,6 +10,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
+/// How much of what was left out is listed: the report has it all.
+const LEFT_OUT: usize = 8;
+
 /// The table of levels.
 pub fn table(report: &Report) -> String {
     let mut rows = vec![
@@ -75,15 +78,32 @@ pub fn summary(report: &Report) -> String {
     out.push_str(
         "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n",
     );
+    out.push_str(&exact(report));
     out.push_str(&held_out(report));
     if report.bound == "paper" {
         out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
     }
-    for what in &report.left_out {
+    for what in report.left_out.iter().take(LEFT_OUT) {
         let _ = writeln!(out, "  left out: {what}");
+    }
+    if let Some(more @ 1..) = report.left_out.len().checked_sub(LEFT_OUT) {
+        let _ = writeln!(out, "  left out: {more} more, in the report");
     }
     out.push('\n');
     out
+}
+
+/// What costs no error, in a line; nothing where there is no such thing.
+fn exact(report: &Report) -> String {
+    let Some(exact) = &report.exact else {
+        return String::new();
+    };
+    let [_, left] = exact.texture_samples;
+    format!(
+        "  exact: cost {:.2}, {} samples, the same picture: in every level, and in no figure of what the others gain\n",
+        exact.cost,
+        samples(left)
+    )
 }
 
 /// The errors of the levels on pictures that decided nothing; nothing where there is no level.

@@ -14,6 +14,8 @@ use lodc_passes::{Recipe, Shader};
 /// The samples of one interval.
 pub(super) struct Checks<'a> {
     stand: &'a Stand<'a>,
+    /// What recipes are replayed on.
+    base: &'a Shader,
     /// All of them, at the start, in the middle and at the end.
     full: [SampleSet<'a>; 3],
     /// The validation split, at the start and at the end.
@@ -42,10 +44,11 @@ pub(super) enum Finding {
 }
 
 impl<'a> Checks<'a> {
-    /// The samples at the start, in the middle and at the end of an interval; those of the interval before end where
+    /// The samples at the start, in the middle and at the end of an interval; recipes are replayed on `base`; those of the interval before end where
     /// this one starts.
     pub(super) fn new(
         stand: &'a Stand<'a>,
+        base: &'a Shader,
         [start, middle, end]: [f64; 3],
         before: Option<Self>,
     ) -> Result<Self, Refused> {
@@ -62,6 +65,7 @@ impl<'a> Checks<'a> {
         };
         Ok(Self {
             stand,
+            base,
             full: [first, full(middle)?, full(end)?],
             validation: [first_unseen, unseen(end)?],
         })
@@ -69,7 +73,7 @@ impl<'a> Checks<'a> {
 
     /// What recipes are replayed on.
     pub(super) fn base(&self) -> &'a Shader {
-        self.stand.base
+        self.base
     }
 
     /// All samples where the interval starts.
@@ -143,18 +147,19 @@ impl<'a> Checks<'a> {
     ) -> Option<Level> {
         let start = self.start();
         let distance = start.distance();
-        let recipe = minimal(self.stand.base, recipe);
-        let shader = recipe.replay(self.stand.base).ok()?;
+        let recipe = minimal(self.base, recipe);
+        let shader = recipe.replay(self.base).ok()?;
         Some(Level {
             autolod: threshold(self.stand.scene, distance),
             distance,
+            is_original: false,
             error: start.figures(&shader).ok()?,
             flip: start.flip(&shader).ok()?,
             held_out: None,
             shader,
             work: measured.work,
             cost: measured.work.total() / start.original().work.total(),
-            error_after: error_after(self.stand, &recipe, search),
+            error_after: error_after(self.base, &recipe, search),
             recipe,
         })
     }
@@ -176,8 +181,8 @@ fn minimal(base: &Shader, recipe: &Recipe) -> Recipe {
 }
 
 /// The RMSE after each step of a recipe, over some samples.
-fn error_after(stand: &Stand<'_>, recipe: &Recipe, set: &SampleSet<'_>) -> Vec<f64> {
-    let mut shader = stand.base.clone();
+fn error_after(base: &Shader, recipe: &Recipe, set: &SampleSet<'_>) -> Vec<f64> {
+    let mut shader = base.clone();
     let mut errors = Vec::new();
     for candidate in &recipe.0 {
         let Ok(next) = lodc_passes::recipe::apply(&shader, candidate) else {

@@ -127,13 +127,19 @@ impl Bottom<'_, '_> {
                     way.pop();
                 }
                 let back = way.last().map(|stop| &stop.variant.recipe);
-                let known = self.found.as_ref().map(|found| &found.recipe) == back;
+                // Where the way begins is known for as long as nothing else is.
+                let found = self.found.as_ref().map(|found| &found.recipe);
+                let known = found.is_some_and(|found| !found.0.is_empty()) && found == back;
                 if known || (way.len() == 1 && !starts_at_base) {
                     return Ok(());
                 }
             }
         }
-        if self.found.is_none() {
+        if self
+            .found
+            .as_ref()
+            .is_none_or(|found| found.recipe.0.is_empty())
+        {
             // A way is in the order of cost, and errors mostly in theirs.
             let (mut low, mut high) = (1, way.len());
             while low < high {
@@ -148,7 +154,7 @@ impl Bottom<'_, '_> {
     }
 
     /// Draws a variant in full, and keeps it when that confirms the cheapest.
-    fn judge(&mut self, variant: &Variant) -> Result<Verdict, Refused> {
+    pub(super) fn judge(&mut self, variant: &Variant) -> Result<Verdict, Refused> {
         let verdict = self.checks.judge(&variant.shader)?;
         match verdict.finding {
             Finding::Confirmed(measured) if measured.work.total() < self.cost() => {

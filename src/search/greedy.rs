@@ -182,8 +182,10 @@ impl Descent<'_, '_> {
             let facts = self.interval.start().facts(&current.shader);
             // What is exact was done before, or is not wanted.
             let passes = PASSES.iter().filter(|pass| !pass.is_exact());
+            let kept = self.guard.kept();
             let candidates: Vec<Candidate> = passes
                 .flat_map(|pass| pass.candidates(&current.shader, &facts))
+                .filter(|candidate| !kept.refuses(candidate))
                 .collect();
             let mut step = Step {
                 keys: candidates.iter().map(key).collect(),
@@ -280,9 +282,12 @@ impl Descent<'_, '_> {
                 .filter(|i| !over.contains(&step.keys[*i]))
                 .filter_map(|i| Some((prices.0.get(&step.keys[i]).copied()??, i)))
                 .collect();
+            let kept = self.guard.kept();
+            let last = |i: usize| !kept.is_first(&step.candidates[i]);
             queue.sort_by(|a, b| {
-                a.0.0
-                    .total_cmp(&b.0.0)
+                last(a.1)
+                    .cmp(&last(b.1))
+                    .then(a.0.0.total_cmp(&b.0.0))
                     .then(a.0.1.total_cmp(&b.0.1))
                     .then(a.1.cmp(&b.1))
             });
@@ -348,7 +353,10 @@ impl Step<'_> {
                     strain: measured.strain,
                     work: measured.work,
                 });
-                if !descent.guard.admits(&measured) {
+                let before = self.current.measured.error.square();
+                let added = (measured.error.square() - before).max(0.0).sqrt();
+                let most = descent.guard.kept().most(&self.candidates[i]);
+                if !descent.guard.admits(&measured) || added > most {
                     over.insert(self.keys[i].clone());
                 }
             }

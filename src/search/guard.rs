@@ -6,6 +6,7 @@
 //! what spoils one highlight spoils the others.
 
 use super::error::Details;
+use super::kept::Kept;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Stand, Tiles};
 use crate::eval::program::Refused;
@@ -21,6 +22,8 @@ const LOWER: f64 = 0.95;
 /// What a variant has to pass before it is worth a step.
 pub(crate) struct Guard<'a> {
     stand: &'a Stand<'a>,
+    /// What the user wants kept.
+    kept: &'a Kept,
     /// Tiles that a variant was refused for, a set for each distance and each time.
     tiles: Vec<SampleSet<'a>>,
     /// How much of its bound a variant may use up on the search set.
@@ -29,9 +32,10 @@ pub(crate) struct Guard<'a> {
 
 impl<'a> Guard<'a> {
     /// Nothing is known yet.
-    pub(crate) fn new(stand: &'a Stand<'a>) -> Self {
+    pub(crate) fn new(stand: &'a Stand<'a>, kept: &'a Kept) -> Self {
         Self {
             stand,
+            kept,
             tiles: Vec::new(),
             limit: 1.0,
         }
@@ -43,6 +47,11 @@ impl<'a> Guard<'a> {
         self.limit = 1.0;
     }
 
+    /// What the user wants kept.
+    pub(crate) fn kept(&self) -> &'a Kept {
+        self.kept
+    }
+
     /// Whether the search set is content with what was measured on it.
     pub(crate) fn admits(&self, measured: &Measured) -> bool {
         measured.strain <= self.limit
@@ -51,6 +60,7 @@ impl<'a> Guard<'a> {
     /// Whether nothing that is known speaks against a variant.
     pub(crate) fn allows(&self, shader: &Shader, measured: &Measured) -> bool {
         self.admits(measured)
+            && self.kept.holds(shader)
             && Programs::of(shader).is_ok_and(|programs| {
                 let mut sets = self.tiles.iter();
                 sets.all(|set| set.strain_of_tiles(&programs) <= 1.0)
@@ -131,7 +141,8 @@ mod tests {
             .expect("it is offered");
         let flat = recipe::apply(&base, mean).expect("it applies");
         let measured = search.measure(&flat).expect("it runs");
-        let mut guard = Guard::new(&stand);
+        let kept = Kept::default();
+        let mut guard = Guard::new(&stand, &kept);
         assert!(guard.allows(&flat, &measured), "{measured:?}");
 
         let full = SampleSet::new(&stand, near, Samples::Full).expect("it runs");
@@ -167,7 +178,8 @@ mod tests {
             vertex: &vertex,
             scene: &scene,
         };
-        let mut guard = Guard::new(&stand);
+        let kept = Kept::default();
+        let mut guard = Guard::new(&stand, &kept);
         // All samples see a quarter more than the search: so much less is allowed.
         guard.lower(&measured(0.9), 1.25);
         assert!(guard.admits(&measured(0.71)) && !guard.admits(&measured(0.73)));

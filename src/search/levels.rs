@@ -8,10 +8,12 @@
 use super::confirm::Checks;
 use super::descend::Bottom;
 use super::error::{ErrorFigures, HeldOut};
+use super::exact::{Exact, Scope};
 use super::frontier::{Frontier, Seen};
 use super::greedy::{Prices, Variant};
 use super::guard::Guard;
 use super::interval::Interval;
+use super::kept::Kept;
 use super::samples::{SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
@@ -27,7 +29,9 @@ pub struct Level {
     pub autolod: f64,
     /// From the eye to the centre of the bounding sphere, in world units.
     pub distance: f64,
-    /// How it is made from the original; empty for the original.
+    /// Whether it is the original as it stands.
+    pub is_original: bool,
+    /// How it is made from what the exact tier made of the original; empty for the original.
     pub recipe: Recipe,
     /// The shader that the recipe makes.
     pub shader: Shader,
@@ -51,6 +55,7 @@ impl Level {
         Self {
             autolod: threshold(stand.scene, set.distance()),
             distance: set.distance(),
+            is_original: true,
             recipe: Recipe::default(),
             shader: stand.base.clone(),
             error: set.floor(),
@@ -59,6 +64,17 @@ impl Level {
             work: set.original().work,
             cost: 1.0,
             error_after: Vec::new(),
+        }
+    }
+
+    /// What draws the same for less, at the nearest distance.
+    fn exact(stand: &Stand<'_>, nearest: &SampleSet<'_>, exact: &Exact) -> Self {
+        Self {
+            is_original: false,
+            shader: exact.shader.clone(),
+            work: exact.work[1],
+            cost: exact.cost(),
+            ..Self::original(stand, nearest)
         }
     }
 }
@@ -84,6 +100,8 @@ pub struct AtDistance {
 /// Everything that a search found.
 #[derive(Clone, Debug)]
 pub struct Found {
+    /// What costs no error: every level but the original is made from this.
+    pub exact: Exact,
     /// Level 0, the original, and those that are worth having, nearest first.
     pub levels: Vec<Level>,
     /// What was seen at each distance.
@@ -107,30 +125,39 @@ pub struct Progress {
     pub share: f64,
 }
 
-/// Searches the levels of a shader in a scene: greedy at each distance, every variant that was seen on
-/// the frontier, frontier members confirmed on the full set.
+/// Searches the levels of a shader in a scene: what costs no error first, then greedy at each distance, every variant that
+/// was seen on the frontier, frontier members confirmed on the full set.
 ///
 /// # Errors
 /// When the evaluator refuses the original, at the expression.
 pub fn find(
     stand: &Stand<'_>,
+    (scope, kept): (Scope, &Kept),
     progress: &(dyn Fn(Progress) + Sync),
 ) -> std::result::Result<Found, Refused> {
     let scene = stand.scene;
     let distances = &scene.distances;
     let nearest = SampleSet::new(stand, distances[0], Samples::Full)?;
-    let mut levels = vec![Level::original(stand, &nearest)];
+    let exact = match scope {
+        Scope::None => Exact::none(stand, &nearest),
+        Scope::Levels | Scope::All => Exact::find(stand, &nearest, kept)?,
+    };
+    let mut levels = vec![match scope == Scope::All && !exact.recipe.0.is_empty() {
+        true => Level::exact(stand, &nearest, &exact),
+        false => Level::original(stand, &nearest),
+    }];
     drop(nearest);
     let mut seen = Vec::new();
     let mut prices = Prices::default();
-    let mut guard = Guard::new(stand);
+    let mut guard = Guard::new(stand, kept);
     let mut variants = 0;
     let mut before_checks = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
         let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
         let middle = (distance * next).sqrt();
         let search = Interval::new(stand, &[distance, next], Samples::Search)?;
-        let checks = Checks::new(stand, [distance, middle, next], before_checks.take())?;
+        let places = [distance, middle, next];
+        let checks = Checks::new(stand, &exact.shader, places, before_checks.take())?;
         guard.start_at(distance);
         let mut bottom = Bottom {
             interval: &search,
@@ -150,9 +177,13 @@ pub fn find(
                 });
             },
         };
-        let base = Variant::new(&search, Recipe::default(), stand.base.clone())?;
+        let base = Variant::new(&search, Recipe::default(), exact.shader.clone())?;
         let before = &levels[levels.len() - 1];
         let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())?;
+        // What draws the same for less may be a level by itself.
+        if exact.cost() < 1.0 - MERGE_BELOW {
+            bottom.judge(&base)?;
+        }
         bottom.find(&base, start)?;
         let Bottom {
             frontier,
@@ -167,7 +198,7 @@ pub fn find(
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {
             Some(level) if worth(&level) => Some(level),
-            _ if before.recipe.0.is_empty() || checks.hold(&before.shader) => None,
+            _ if before.is_original || checks.hold(&before.shader) => None,
             other => Some(other.unwrap_or_else(|| Level::original(stand, checks.start()))),
         };
         if let Some(mut level) = next_level {
@@ -186,6 +217,7 @@ pub fn find(
         });
     }
     Ok(Found {
+        exact,
         levels,
         distances: seen,
         variants,

@@ -3,7 +3,8 @@
 //! ```text
 //! Scene x original --samples--> SampleSet      what errors are measured over, at one distance
 //! SampleSet x Shader --error--> E^2, work      one variant
-//! base x SampleSet --greedy, best--> variants --frontier--> non-dominated ones
+//! base x SampleSet --exact--> start            what costs no error, which no later step is credited with
+//! start x SampleSet --greedy, best--> variants --frontier--> non-dominated ones
 //! frontiers x distances --levels--> levels     confirmed on the full set
 //!   what it refuses --guard--> what greedy has to heed
 //! ```
@@ -16,20 +17,25 @@ mod descend;
 #[cfg(feature = "gpu")]
 pub mod drawn;
 pub mod error;
+mod exact;
 mod facts;
 mod frame;
 pub mod frontier;
 mod greedy;
 mod guard;
 mod interval;
+mod kept;
 pub mod levels;
 mod programs;
 pub mod samples;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
+pub use exact::{Exact, Scope};
 pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
+pub use kept::Kept;
+pub(crate) use kept::is_within;
 pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, find};
 pub use programs::Programs;

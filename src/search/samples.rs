@@ -261,6 +261,22 @@ impl<'a> SampleSet<'a> {
         (details.0, measured)
     }
 
+    /// Whether two shaders draw the same pictures, to the last bit of what is displayed.
+    ///
+    /// # Errors
+    /// When the evaluator refuses one of them.
+    pub fn same(&self, one: &Shader, other: &Shader) -> Result<bool, Refused> {
+        let programs = [Programs::of(one)?, Programs::of(other)?];
+        let output = self.stand.scene.output;
+        Ok(self.frames.par_iter().all(|frame| {
+            let differences = frame.differences(&programs, output);
+            let bits = |all: &[[f32; 6]]| -> Vec<[u32; 6]> {
+                all.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
+            };
+            matches!(&differences[..], [one, other] if bits(one) == bits(other))
+        }))
+    }
+
     /// All error figures of a variant, against the original's and the bound at this distance.
     ///
     /// # Errors

@@ -33,7 +33,7 @@ use crate::semantics::Shape;
 use crate::shader::{Shader, Stage};
 use crate::{Facts, constants};
 use absent::Absent;
-use naga::{Expression, ScalarKind};
+use naga::{Expression, Handle, ScalarKind};
 use place::Place;
 
 /// The stage that is specialised: levels share the vertex stage of the source.
@@ -173,6 +173,54 @@ impl Pass for Specialize {
     }
 }
 
+/// A shader with changes of this pass made to it, all at once: those that apply to it as it is, at any load of their
+/// places. What they leave draws as one after another would; its values may be named otherwise.
+pub fn together(shader: &Shader, candidates: &[Candidate]) -> Shader {
+    let Some(flow) = Flow::new(shader, STAGE) else {
+        return shader.clone();
+    };
+    let mut edit = Edit::new(shader, STAGE);
+    for candidate in candidates {
+        let changes = match Choice::parse(&candidate.choice) {
+            Ok(Choice::Fixed(path, integers)) => {
+                fold(&flow, loads(&flow, path), &integers, &candidate.value)
+            }
+            _ => plan(shader, candidate),
+        };
+        for (value, new) in changes.into_iter().flatten() {
+            edit.replace(value, new);
+        }
+    }
+    edit.finish()
+}
+
+/// The place that a change folds and what is there, for people: `material.flags` and `5`, `sun.colour` and `[1, 0.5, 0.5]`;
+/// `None` for other changes.
+pub fn folded(candidate: &Candidate) -> Option<(String, String)> {
+    if candidate.pass != Specialize.name() {
+        return None;
+    }
+    let Ok(Choice::Fixed(path, _)) = Choice::parse(&candidate.choice) else {
+        return None;
+    };
+    let integers = candidate.choice.split(' ').skip(2);
+    let mut numbers: Vec<String> = integers
+        .map(|number| number.trim_end_matches(['u', 'i']).to_owned())
+        .collect();
+    numbers.extend(candidate.numbers().map(|number| number.to_string()));
+    let value = match &numbers[..] {
+        [one] => one.clone(),
+        several => format!("[{}]", several.join(", ")),
+    };
+    Some((path.to_owned(), value))
+}
+
+/// The place of a uniform or read-only storage buffer that a value of the fragment stage loads, such as
+/// `lighting.lights[*].intensity`, where `[*]` stands for an index that varies.
+pub fn place(shader: &Shader, value: Handle<Expression>) -> Option<String> {
+    Some(Place::loaded(&Flow::new(shader, STAGE)?, value)?.path)
+}
+
 /// What a candidate replaces by what.
 fn plan(shader: &Shader, candidate: &Candidate) -> Result<Vec<(Value, New)>, Declined> {
     let choice = Choice::parse(&candidate.choice)?;
@@ -188,16 +236,7 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<Vec<(Value, New)>, Dec
             if Place::loaded(&flow, site).is_none_or(|place| place.path != path) {
                 return Err(Declined(format!("it is no load of `{path}`")));
             }
-            let loads = loads(&flow, path);
-            let is_float = flow.is_float(site);
-            let words = match integers.is_empty() {
-                true if is_float => &candidate.value,
-                false if !is_float && candidate.value.is_empty() => &integers,
-                _ => return Err(Declined("it bakes numbers of another kind".into())),
-            };
-            becomes_constant(&flow, &loads, words)?;
-            let constant = |load| (load, New::Words(words.clone()));
-            Ok(loads.into_iter().map(constant).collect())
+            fold(&flow, loads(&flow, path), &integers, &candidate.value)
         }
         Choice::Absent => {
             if !candidate.value.is_empty() {
@@ -208,6 +247,24 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<Vec<(Value, New)>, Dec
             Ok(vec![(site, absent.becomes(&flow, site))])
         }
     }
+}
+
+/// What loads become: these integers, or what is baked beside them.
+fn fold(
+    flow: &Flow,
+    loads: Vec<Value>,
+    integers: &[u32],
+    baked: &[u32],
+) -> Result<Vec<(Value, New)>, Declined> {
+    let is_float = loads.iter().all(|load| flow.is_float(*load));
+    let words = match integers.is_empty() {
+        true if is_float => baked,
+        false if !is_float && baked.is_empty() => integers,
+        _ => return Err(Declined("it bakes numbers of another kind".into())),
+    };
+    becomes_constant(flow, &loads, words)?;
+    let constant = |load| (load, New::Words(words.to_vec()));
+    Ok(loads.into_iter().map(constant).collect())
 }
 
 /// The loads of a place, in arena order.

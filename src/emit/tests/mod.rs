@@ -53,6 +53,41 @@ fn has(text: &str, part: &str) {
     assert!(text.contains(part), "no `{part}` in\n{text}");
 }
 
+#[test]
+fn a_level_at_zero_takes_the_place_of_the_original() {
+    let source = source(SMALL);
+    let levels = [level(&source, 0.0), level(&source, 2.1)];
+    let emitted = |levels: &[EmitLevel], form| {
+        let files = emit(&source, &base(&source), levels, output(form, Target::Wgsl));
+        let files = files.unwrap_or_else(|e| panic!("{e}"));
+        let texts = files.into_iter().map(|(name, bytes)| {
+            let text = String::from_utf8(bytes).expect("it is text");
+            (name.display().to_string(), text)
+        });
+        texts.collect::<Vec<_>>()
+    };
+    for form in [Form::Override, Form::Uniform] {
+        let text = &emitted(&levels, form)[0].1;
+        assert!(!text.contains("original_fs_main"), "{text}");
+        has(
+            text,
+            "// 0      0.00     -      0.50  detail left out\n// 1      2.10 ",
+        );
+        has(
+            text,
+            ">= 2.1) { return lod_zero_fs_main(uv0); }\n    return lod_one_fs_main(uv0);",
+        );
+        has(text, "// Level 0. Detail left out.\nfn lod_zero_fs_main(");
+        let alone = &emitted(&levels[..1], form)[0].1;
+        has(alone, "{\n    return lod_zero_fs_main(uv0);\n}");
+    }
+    let files = emitted(&levels, Form::Files);
+    assert_eq!(files[0].0, "test.lod0.wgsl");
+    has(&files[0].1, "// Level 0 of test.wgsl");
+    assert_eq!(files[1].0, "test.lod1.wgsl");
+    assert_eq!(files.len(), 2);
+}
+
 /// A small material with a name of every awkward kind.
 const SMALL: &str = "\
 // A material. /* fn fs_main */
@@ -425,7 +460,7 @@ fn without_levels_the_original_is_written() {
 fn thresholds_rise() {
     let source = source(SMALL);
     for thresholds in [
-        [0.0, 1.0],
+        [0.0, 0.0],
         [1.0, 1.0],
         [2.0, 1.0],
         [1.0, f32::NAN],

@@ -1,0 +1,121 @@
+//! What the user wants kept, by name: `--keep`.
+
+use super::search::Ready;
+use crate::front::names::nearest;
+use crate::search::{Kept, is_within};
+use crate::{Diagnostic, Result};
+use lodc_passes::{Stage, specialize};
+use naga::{Expression, Handle};
+use std::collections::BTreeSet;
+
+impl Ready {
+    /// What is to be kept: textures, buffers and places in them, functions, and values by a part of their paths. And what the
+    /// comments of the shader say.
+    ///
+    /// # Errors
+    /// When a name is none of these, and as [`Self::directives`].
+    pub(super) fn kept(&self, names: &[String]) -> Result<Kept> {
+        let mut kept = Kept::default();
+        for name in names {
+            let variables = self.source.module.global_variables.iter();
+            let is_variable = variables
+                .filter_map(|(_, variable)| variable.name.as_ref())
+                .any(|variable| is_within(name, variable));
+            let read = self.read_names();
+            if is_variable {
+                if read.iter().any(|place| is_within(place, name)) {
+                    kept.read.insert(name.clone());
+                    continue;
+                }
+                let mut stated = self.scene.uniforms.iter();
+                if !name.contains(['.', '[']) || stated.any(|u| is_within(&u.path, name)) {
+                    // It is there, and no fragment reads it.
+                    continue;
+                }
+            }
+            let values = self.values_of(name);
+            let is_function = self
+                .source
+                .module
+                .functions
+                .iter()
+                .any(|(_, function)| function.name.as_deref() == Some(name));
+            if values.is_empty() && !is_function {
+                return Err(self.nothing_to_keep(name, &read));
+            }
+            kept.values.extend(values);
+        }
+        self.directives(&mut kept)?;
+        Ok(kept)
+    }
+
+    /// What the fragment stage reads: variables, and places of buffers.
+    pub(super) fn read_names(&self) -> BTreeSet<String> {
+        let Some(function) = self.base.function(Stage::Fragment) else {
+            return BTreeSet::new();
+        };
+        let values = function.expressions.iter();
+        let read = values.filter_map(|(value, expression)| match *expression {
+            Expression::GlobalVariable(variable) => {
+                self.base.module().global_variables[variable].name.clone()
+            }
+            Expression::Load { .. } => specialize::place(&self.base, value),
+            _ => None,
+        });
+        read.collect()
+    }
+
+    /// The paths of the values of the fragment stage that a person could mean: those that are computed.
+    pub(super) fn computed(&self) -> impl Iterator<Item = (Handle<Expression>, &str)> {
+        let function = self.base.function(Stage::Fragment);
+        let values = function.into_iter().flat_map(|f| f.expressions.iter());
+        values
+            .filter(|(_, expression)| !expression.needs_pre_emit())
+            .map(|(value, _)| (value, self.base.id(Stage::Fragment, value).path()))
+    }
+
+    /// The values that a name stands for: by a part of their paths, a function's all that it computes.
+    fn values_of(&self, name: &str) -> BTreeSet<String> {
+        let wanted: Vec<&str> = name.split('.').collect();
+        let means = |path: &str| {
+            let path: Vec<&str> = path.split('.').collect();
+            let mut places = path.windows(wanted.len());
+            places.any(|place| {
+                let mut steps = place.iter().zip(&wanted);
+                steps.all(|(step, wanted)| is_called(step, wanted))
+            })
+        };
+        let computed = self.computed().map(|(_, path)| path);
+        computed
+            .filter(|path| means(path))
+            .map(str::to_owned)
+            .collect()
+    }
+
+    fn nothing_to_keep(&self, name: &str, read: &BTreeSet<String>) -> Box<Diagnostic> {
+        let error = Diagnostic::error(format!("there is no `{name}` to keep"));
+        let known: BTreeSet<&str> = read
+            .iter()
+            .map(String::as_str)
+            .chain(
+                self.computed()
+                    .flat_map(|(_, path)| path.split('.').skip(1)),
+            )
+            .collect();
+        let near = nearest(name, known, 3);
+        error.with_note(match near.is_empty() {
+            true => "name a texture, a uniform such as `material.flags`, a function, or a value that `lodc inspect` lists".to_owned(),
+            false => format!("did you mean {}?", near.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+        })
+    }
+}
+
+/// Whether a step of a path is a value of that name: what a variable holds later has a number behind it.
+pub(super) fn is_called(step: &str, name: &str) -> bool {
+    step.strip_prefix(name).is_some_and(|rest| {
+        rest.is_empty()
+            || rest
+                .strip_prefix('_')
+                .is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    })
+}

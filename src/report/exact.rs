@@ -1,0 +1,154 @@
+//! What the exact tier left out, and why.
+
+use super::{ExactReport, Unread, place_of, steps};
+use crate::front::Source;
+use crate::search::Found;
+use lodc_passes::{Shader, Stage, specialize};
+use naga::{AddressSpace, Expression, Function, Handle, Module, TypeInner};
+use std::collections::BTreeSet;
+
+/// The exact tier as a report has it; nothing when there was nothing to do.
+pub(super) fn report(found: &Found, base: &Shader, source: &Source) -> Option<ExactReport> {
+    let exact = &found.exact;
+    if exact.recipe.0.is_empty() {
+        return None;
+    }
+    let [before, after] = exact.work;
+    Some(ExactReport {
+        cost: exact.cost(),
+        operations: [before.operations(), after.operations()],
+        texture_samples: [before.samples, after.samples],
+        recipe: steps(&exact.recipe, &[], base, source),
+        unread: unread(base, &exact.shader),
+    })
+}
+
+/// What was left out, a sentence each: what the scene fixes, with what goes for it, what a 0 or a 1 makes pointless, what
+/// nothing reads any more, and what looked like one of these and is not.
+pub(super) fn left_out(found: &Found, base: &Shader, source: &Source) -> Vec<String> {
+    let exact = &found.exact;
+    let line = |site| {
+        let place = base.find(site).and_then(|at| place_of(base, source, at));
+        place.map_or_else(String::new, |place| match place.is_in_main() {
+            true => format!(", line {}", place.line()),
+            false => format!(", line {} of {}", place.line(), place.file.name),
+        })
+    };
+    let mut said = Vec::new();
+    for candidate in &exact.recipe.0 {
+        let at = line(&candidate.site);
+        said.push(match specialize::folded(candidate) {
+            Some((place, value)) => {
+                format!("`{place}` is read no more{at}: the scene fixes it at {value}")
+            }
+            None => format!(
+                "`{}` needs no operation{at}: an operand is known to be 0 or 1",
+                candidate.site.path()
+            ),
+        });
+    }
+    let Unread {
+        textures,
+        bindings,
+        varyings,
+    } = unread(base, &exact.shader);
+    for (what, names) in [
+        ("texture", textures),
+        ("binding", bindings),
+        ("fragment input", varyings),
+    ] {
+        said.extend(
+            names
+                .into_iter()
+                .map(|name| format!("the {what} `{name}`: nothing that the scene needs reads it")),
+        );
+    }
+    for considered in &exact.declined {
+        let (candidate, declined) = (&considered.candidate, &considered.declined);
+        let at = line(&candidate.site);
+        if let Some(declined) = declined {
+            said.push(format!(
+                "not left out: {} of `{}`{at}: {declined}",
+                candidate.choice.split(' ').next().unwrap_or_default(),
+                candidate.site.path()
+            ));
+        }
+    }
+    said
+}
+
+/// What the fragment stage of a shader reads, and that of a variant does not.
+fn unread(base: &Shader, variant: &Shader) -> Unread {
+    let [before, after] = [base, variant].map(|shader| {
+        let function = shader.function(Stage::Fragment);
+        function.map_or_else(Read::default, |function| {
+            Read::of(shader.module(), function)
+        })
+    });
+    let gone = |before: &BTreeSet<String>, after: &BTreeSet<String>| {
+        before.difference(after).cloned().collect()
+    };
+    Unread {
+        textures: gone(&before.textures, &after.textures),
+        bindings: gone(&before.bindings, &after.bindings),
+        varyings: gone(&before.varyings, &after.varyings),
+    }
+}
+
+/// What a function reads, by name.
+#[derive(Default)]
+struct Read {
+    textures: BTreeSet<String>,
+    bindings: BTreeSet<String>,
+    varyings: BTreeSet<String>,
+}
+
+impl Read {
+    fn of(module: &Module, function: &Function) -> Self {
+        let mut read = Self::default();
+        for (_, expression) in function.expressions.iter() {
+            match *expression {
+                Expression::GlobalVariable(variable) => {
+                    let variable = &module.global_variables[variable];
+                    let Some(name) = variable.name.clone().filter(|_| variable.binding.is_some())
+                    else {
+                        continue;
+                    };
+                    let is_texture = variable.space == AddressSpace::Handle
+                        && !matches!(module.types[variable.ty].inner, TypeInner::Sampler { .. });
+                    match is_texture {
+                        true => read.textures.insert(name),
+                        false => read.bindings.insert(name),
+                    };
+                }
+                Expression::AccessIndex { base, index } => {
+                    read.varyings.extend(input(module, function, base, index));
+                }
+                Expression::FunctionArgument(at) => {
+                    let argument = function.arguments.get(at as usize);
+                    let plain = argument.filter(|argument| argument.binding.is_some());
+                    read.varyings
+                        .extend(plain.and_then(|argument| argument.name.clone()));
+                }
+                _ => {}
+            }
+        }
+        read
+    }
+}
+
+/// The name of a member of an input struct.
+fn input(
+    module: &Module,
+    function: &Function,
+    base: Handle<Expression>,
+    index: u32,
+) -> Option<String> {
+    let Expression::FunctionArgument(at) = function.expressions[base] else {
+        return None;
+    };
+    match &module.types[function.arguments.get(at as usize)?.ty].inner {
+        TypeInner::Struct { members, .. } => members.get(index as usize)?.name.clone(),
+        _ => None,
+    }
+}
