@@ -43,6 +43,8 @@ pub struct Request {
     pub scene: Option<PathBuf>,
     /// How errors are held against the bound; by default as the scene says.
     pub bound: Option<BoundReading>,
+    /// Whether the host fills the parameter block, beside what the scene says.
+    pub parameters: bool,
     /// The shader to write; by default `<stem>.lod.wgsl` beside the source.
     pub output: Option<PathBuf>,
     /// The entry points, where there are several.

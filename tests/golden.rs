@@ -26,7 +26,7 @@ use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
 use lodc_passes::facts::{Facts, ValueFacts};
-use lodc_passes::{PASSES, Pass, Shader, UNSEARCHED, ValueId};
+use lodc_passes::{Pass, Shader, ValueId, all_passes};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -34,9 +34,9 @@ use std::path::Path;
 #[test]
 fn passes_do_to_their_fixtures_what_the_goldens_say() {
     let mut goldens = Goldens::of("golden");
-    for pass in PASSES.iter().chain(UNSEARCHED) {
+    for pass in all_passes() {
         for path in fixtures::shaders(Path::new("testdata/passes").join(pass.name())) {
-            let (golden, offered) = golden(*pass, &path);
+            let (golden, offered) = golden(pass, &path);
             let name = format!(
                 "{}/{}",
                 pass.name(),

@@ -8,7 +8,7 @@ mod synthetic;
 
 use lodc::front::Source;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
-use lodc_passes::{Facts, PASSES, Pass, Shader, Stage, UNSEARCHED};
+use lodc_passes::{Facts, PASSES, Pass, Shader, Stage, all_passes};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;
@@ -46,14 +46,9 @@ struct Subject {
     facts: Facts,
 }
 
-/// Every pass.
-fn passes() -> impl Iterator<Item = &'static dyn Pass> {
-    PASSES.iter().chain(UNSEARCHED).copied()
-}
-
 /// Every candidate of every pass.
 fn offered(shader: &Shader, facts: &Facts) -> Vec<Candidate> {
-    passes()
+    all_passes()
         .flat_map(|pass| pass.candidates(shader, facts))
         .collect()
 }
@@ -67,7 +62,7 @@ fn subjects() -> Vec<Subject> {
     };
     paths.extend(PASSES.iter().flat_map(|pass| fixtures_of(*pass)));
     let mut random = Random::new(paths.len());
-    paths.extend(UNSEARCHED.iter().flat_map(|pass| fixtures_of(*pass)));
+    paths.extend(all_passes().skip(PASSES.len()).flat_map(fixtures_of));
     paths
         .iter()
         .map(|path| {
@@ -268,14 +263,14 @@ fn any_candidate_can_be_asked_of_any_shader() {
             2 => candidate.value = vec![0x3f00_0000; random.below(6)],
             3 => candidate.site = all[random.below(all.len())].site.clone(),
             4 => {
-                candidate.pass = passes()
-                    .nth(random.below(PASSES.len() + UNSEARCHED.len()))
+                candidate.pass = all_passes()
+                    .nth(random.below(all_passes().count()))
                     .map_or(String::new(), |pass| pass.name().into())
             }
             _ => {}
         }
         let subject = &subjects[random.below(subjects.len())];
-        for pass in passes() {
+        for pass in all_passes() {
             // Asked of the wrong pass as well: an answer is all that counts.
             if pass.applies(&subject.shader, &candidate).is_ok() && pass.name() == candidate.pass {
                 let next = pass.apply(&subject.shader, &candidate);

@@ -58,6 +58,15 @@ impl Shader {
         }
     }
 
+    /// Whether a stage reads the parameter block.
+    pub fn reads_parameters(&self, stage: Stage) -> bool {
+        let (Some(block), Some(function)) = (self.parameter_block(), self.function(stage)) else {
+            return false;
+        };
+        let mut values = function.expressions.iter();
+        values.any(|(_, e)| matches!(e, Expression::GlobalVariable(v) if *v == block.read))
+    }
+
     /// The parameter stage as an entry point of a module that returns the block's members, each at the location that is
     /// its place in the block, and stores nothing; and its place among the module's entry points.
     pub fn parameters_returned(&self) -> Option<(Module, usize)> {

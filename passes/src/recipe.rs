@@ -1,7 +1,7 @@
 //! Candidates and recipes: one simplification as data, and an ordered list of them.
 
 use crate::shader::{Shader, ValueId};
-use crate::{Facts, PASSES, UNSEARCHED};
+use crate::{Facts, PASSES, all_passes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -247,8 +247,7 @@ pub fn considered(shader: &Shader, facts: &Facts) -> BTreeMap<ValueId, Vec<Consi
 /// # Errors
 /// When no pass has that name.
 pub fn pass(name: &str) -> Result<&'static dyn Pass, Declined> {
-    let mut passes = PASSES.iter().chain(UNSEARCHED).copied();
-    passes
+    all_passes()
         .find(|pass| pass.name() == name)
         .ok_or_else(|| Declined(format!("there is no pass `{name}`")))
 }

@@ -290,7 +290,7 @@ impl Shader {
     }
 
     /// What handing over the values costs that passes have moved to the vertex stage, for a fragment, in full-rate scalar
-    /// operations; `None` when none has been moved, and the vertex stage is the author's.
+    /// operations; `None` when none has been moved, and the vertex stage reads no parameters: then it is the author's.
     pub fn handing_over(&self) -> Option<f64> {
         let function = self.function(Stage::Fragment)?;
         let added = function.arguments.get(self.authors.arguments..)?;
@@ -308,7 +308,8 @@ impl Shader {
             };
             each * f64::from(components)
         });
-        (!added.is_empty()).then(|| costs.sum())
+        let own = !added.is_empty() || self.reads_parameters(Stage::Vertex);
+        own.then(|| costs.fold(0.0, |sum, cost| sum + cost))
     }
 
     /// The identity of one stage: a hash of what its entry point does.

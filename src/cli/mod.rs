@@ -214,12 +214,23 @@ struct CompileArgs {
     /// A uniform, texture, value or function that is never folded, simplified or left out; as often as wanted
     #[arg(long, value_name = "NAME")]
     keep: Vec<String>,
+    /// What the host does for levels beyond drawing them: with parameters, it fills a block of them once a draw [default:
+    /// nothing but what the scene says]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "parameters")]
+    host: Vec<HostWord>,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
     /// Prints nothing but errors
     #[arg(short, long)]
     quiet: bool,
+}
+
+/// What a host may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum HostWord {
+    /// It fills the parameter block
+    Parameters,
 }
 
 /// Runs the tool. Exit code 0: done; 1: a check failed; 2: bad input or usage.
@@ -424,6 +435,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     let mut request = arguments.input.request()?;
     request.output = arguments.output;
     request.bound = arguments.bound;
+    request.parameters = arguments.host.contains(&HostWord::Parameters);
     request.form = arguments.form;
     request.target = arguments.target;
     request.exact = match (arguments.specialize, arguments.exact) {

@@ -11,7 +11,7 @@ use crate::report::{Input, Origin, Report};
 use crate::scene::{Reading, Scene};
 use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
 use crate::{Diagnostic, Result};
-use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage};
+use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS};
 use naga::Expression;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -92,6 +92,7 @@ impl Read {
     /// With the scene as it is for this shader.
     pub(super) fn ready(self, mut scene: Scene) -> Ready {
         scene.reading = self.request.bound.unwrap_or(scene.reading);
+        scene.host.parameters |= self.request.parameters;
         Ready {
             request: self.request,
             source: self.source,
@@ -455,6 +456,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let facts = set.facts(&ready.base);
     let candidates: Vec<Candidate> = PASSES
         .iter()
+        .chain(WITH_PARAMETERS)
         .flat_map(|pass| pass.candidates(&ready.base, &facts))
         .collect();
     let tried = search::try_each(&set, &ready.base, &candidates);

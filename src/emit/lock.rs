@@ -11,7 +11,7 @@ use super::{EmitLevel, Output};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Candidate, PASSES, Recipe, ReplayError, Shader};
+use lodc_passes::{Candidate, Recipe, ReplayError, Shader, all_passes};
 use serde::Deserialize;
 use std::fmt::Write;
 use std::ops::Range;
@@ -555,7 +555,7 @@ type Located<'a> = dyn Fn(String, Range<usize>, &str) -> Box<Diagnostic> + 'a;
 
 impl RawStep {
     fn candidate(self, at: &Located<'_>) -> Result<Candidate> {
-        let known: Vec<&str> = PASSES.iter().map(|pass| pass.name()).collect();
+        let known: Vec<&str> = all_passes().map(|pass| pass.name()).collect();
         if !known.contains(&self.pass.get_ref().as_str()) {
             return Err(at(
                 format!("there is no pass `{}`", self.pass.get_ref()),
@@ -774,7 +774,7 @@ mod tests {
     fn a_recipe_replays_as_it_was_applied() {
         let (base, mut lock) = small();
         let facts = lodc_passes::Facts::default();
-        let candidate = PASSES
+        let candidate = lodc_passes::PASSES
             .iter()
             .flat_map(|pass| pass.candidates(&base, &facts))
             .next()

@@ -43,6 +43,8 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut without = Vec::new();
     let mut widened = Vec::new();
     let mut moved = Vec::new();
+    let mut per_draw = Vec::new();
+    let mut averaged = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -60,6 +62,8 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             }
             Some(("normal-to-roughness", _)) => widened.push(site),
             None if pass == "vertex-motion" => moved.push(site),
+            None if candidate.choice == "exact" => per_draw.push(site),
+            Some(("average", _)) => averaged.push(site),
             _ => others.push(format!("{site}: {}", candidate.choice)),
         }
     }
@@ -91,6 +95,12 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     }
     if !moved.is_empty() {
         clauses.push(format!("{} per vertex", listed(&moved, "values")));
+    }
+    if !averaged.is_empty() {
+        clauses.push(format!("{} averaged per draw", listed(&averaged, "values")));
+    }
+    if !per_draw.is_empty() {
+        clauses.push(format!("{} per draw", listed(&per_draw, "values")));
     }
     match kept.len() {
         0..=2 => clauses.append(&mut kept),
@@ -150,10 +160,16 @@ mod tests {
             candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
             candidate("vertex-motion", "main.specular", "interpolate"),
             candidate("vertex-motion", "main.sun", "flat"),
+            candidate("to-parameter", "main.tint", "exact"),
+            candidate(
+                "to-parameter",
+                "main.glow",
+                "average main.at#0123456789abcdef main.up",
+            ),
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex"
+            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex; glow averaged per draw; tint per draw"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }

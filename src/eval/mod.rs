@@ -12,6 +12,7 @@ pub mod draw;
 pub mod image;
 pub mod lane;
 pub mod machine;
+pub mod parameters;
 pub mod program;
 pub mod raster;
 pub mod texture;

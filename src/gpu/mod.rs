@@ -19,6 +19,7 @@ mod entry;
 pub mod error;
 mod lavapipe;
 mod opengl;
+mod parameters;
 mod pass;
 mod read;
 mod render;
@@ -27,4 +28,5 @@ mod vertices;
 pub mod worker;
 
 pub use adapter::{AdapterLabel, Gpu, list};
+pub use parameters::parameters;
 pub use render::{Drawn, Pipeline, Renderer, Stages};

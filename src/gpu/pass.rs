@@ -382,7 +382,7 @@ fn without_overrides(module: &Module, at: usize, auto_lod: Option<f64>) -> Resul
     Ok((settled.into_owned(), found))
 }
 
-fn validated(module: &Module) -> Result<ModuleInfo> {
+pub(super) fn validated(module: &Module) -> Result<ModuleInfo> {
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
     validator.validate(module).map_err(|error| {
         Diagnostic::error("a shader cannot be drawn as it is")

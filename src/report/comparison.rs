@@ -78,6 +78,7 @@ impl ComparedAt {
                 moved_operations: 0.0,
                 vertex_operations: 0.0,
                 parameters: 0,
+                ratio_with_parameters: None,
                 texture_bytes: 0,
             }),
             ratio: works.and_then(|[original, other]| {

@@ -12,7 +12,8 @@ pub use terminal::{inspection, next, summary, table};
 
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
-use lodc_passes::{Class, PASSES, Recipe, Shader, Stage, cost};
+use lodc_passes::recipe::pass;
+use lodc_passes::{Class, Recipe, Shader, Stage, cost};
 use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
@@ -165,13 +166,15 @@ pub struct CostReport {
     pub operations: f64,
     /// Texture samples of a covered fragment.
     pub texture_samples: f64,
-    /// What was moved to the vertices and is done there, and what handing it over costs, in full-rate scalar operations a
+    /// What was moved to the vertices or to parameters and is done there, and what handing it over costs, in full-rate scalar operations a
     /// covered fragment.
     pub moved_operations: f64,
     /// Arithmetic of a vertex, static, in full-rate scalar operations.
     pub vertex_operations: f64,
     /// Parameters that the host must fill.
     pub parameters: u32,
+    /// What the ratio of the time would be if the host filled a block of parameters, where it does not and that is less.
+    pub ratio_with_parameters: Option<f64>,
     /// Bytes of generated textures.
     pub texture_bytes: u64,
 }
@@ -344,7 +347,8 @@ fn level_report(
             texture_samples: level.work.samples,
             moved_operations: level.work.moved,
             vertex_operations: of_vertex(&level.shader),
-            parameters: 0,
+            parameters: level.shader.parameters().len() as u32,
+            ratio_with_parameters: level.with_parameters,
             texture_bytes: 0,
         },
         mesh: MeshReport {
@@ -366,10 +370,7 @@ fn steps(recipe: &Recipe, error_after: &[f64], base: &Shader, source: &Source) -
             pass: candidate.pass.clone(),
             site: candidate.site.to_string(),
             choice: candidate.choice.clone(),
-            class: PASSES
-                .iter()
-                .find(|pass| pass.name() == candidate.pass)
-                .map(|pass| pass.class(candidate)),
+            class: pass(&candidate.pass).map(|pass| pass.class(candidate)).ok(),
             file: place
                 .as_ref()
                 .filter(|place| !place.is_in_main())

@@ -4,7 +4,7 @@ use super::{Report, place_of};
 use crate::emit::Form;
 use crate::front::{Place, Source};
 use crate::search::Measured;
-use lodc_passes::{Candidate, Facts, Rates, Shader, Stage, texture_removal};
+use lodc_passes::{Candidate, Facts, Rates, Shader, Stage, WITH_PARAMETERS, texture_removal};
 use naga::{Expression, Handle};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -83,6 +83,7 @@ pub fn summary(report: &Report) -> String {
     if report.bound == "paper" {
         out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
     }
+    out.push_str(&with_parameters(report));
     for what in report.left_out.iter().take(LEFT_OUT) {
         let _ = writeln!(out, "  left out: {what}");
     }
@@ -126,6 +127,24 @@ fn held_out(report: &Report) -> String {
         "  error on pictures that the search has not seen: {}\n",
         errors.join(", ")
     )
+}
+
+/// What levels would cost if the host filled a block of parameters, where that is a difference.
+fn with_parameters(report: &Report) -> String {
+    let levels = report.levels.iter().enumerate();
+    let costs: Vec<String> = levels
+        .filter_map(|(i, level)| {
+            let ratio = level.cost.ratio_with_parameters?;
+            Some(format!("{ratio:.2} of level {i}"))
+        })
+        .collect();
+    match costs.is_empty() {
+        true => String::new(),
+        false => format!(
+            "  with --host parameters, what is the same for a whole draw is computed once: cost {}\n",
+            costs.join(", ")
+        ),
+    }
 }
 
 /// What to do next, after the files have been written.
@@ -228,10 +247,15 @@ pub fn inspection(
             .passes
             .iter()
             .map(|(pass, count)| {
+                let mut asking = WITH_PARAMETERS.iter();
+                let mark = match asking.any(|asking| asking.name() == *pass) {
+                    true => "*",
+                    false => "",
+                };
                 if *count == 1 {
-                    (*pass).to_owned()
+                    format!("{pass}{mark}")
                 } else {
-                    format!("{pass} ({count})")
+                    format!("{pass}{mark} ({count})")
                 }
             })
             .chain(deviation)
@@ -259,7 +283,11 @@ pub fn inspection(
     }
     let left = [false, true, true, true, true, false, false, true];
     let table = columns(&rows, &left);
-    format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n")
+    let asks = match table.contains("*") {
+        true => "  * asks the host to fill a block: --host parameters\n",
+        false => "",
+    };
+    format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n{asks}")
 }
 
 /// The cheaper rates that a value could have, or what keeps it where it is.

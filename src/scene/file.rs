@@ -33,6 +33,8 @@ pub(super) struct SceneFile {
     #[serde(default)]
     pub(super) modules: Modules,
     #[serde(default)]
+    pub(super) host: HostTable,
+    #[serde(default)]
     pub(super) distance: Distance,
     #[serde(default)]
     pub(super) views: Views,
@@ -65,6 +67,14 @@ pub(super) struct LightingTable {
     pub(super) textures: Entries,
     #[serde(default)]
     pub(super) samplers: Entries,
+}
+
+/// `[host]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HostTable {
+    #[serde(default)]
+    pub(super) parameters: bool,
 }
 
 /// `[shader]`.

@@ -206,6 +206,10 @@ impl Writer<'_> {
             "how the bound is read; paper: as Liang's paper does",
         );
         self.line(
+            &format!("host = {{ parameters = {} }}", scene.host.parameters),
+            "whether it fills a block of parameters once a draw",
+        );
+        self.line(
             &format!("pixels_per_degree = {:?}", scene.pixels_per_degree),
             "of the display, for FLIP",
         );

@@ -85,6 +85,8 @@ pub struct Scene {
     pub farthest: f64,
     /// How errors are held against the bound.
     pub reading: BoundReading,
+    /// What the host does for levels.
+    pub host: Host,
     /// How many offsets within a pixel errors are measured at.
     pub offsets: usize,
     /// How many pixels a degree has for whoever looks at a picture, for FLIP.
@@ -117,6 +119,13 @@ pub struct Scene {
     /// The bindings that are the same in every picture.
     constant: Bindings,
     samples: usize,
+}
+
+/// What a host does for levels beyond drawing them: a level asks for it only where it is allowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Host {
+    /// It fills the parameter block once a draw, and binds it.
+    pub parameters: bool,
 }
 
 /// A file that a result depends on.
@@ -372,6 +381,7 @@ impl Scene {
             nearest: settings.nearest,
             farthest: settings.farthest,
             reading: settings.reading,
+            host: settings.host,
             offsets: settings.offsets,
             pixels_per_degree: settings.pixels_per_degree,
             output: settings.output,

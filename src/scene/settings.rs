@@ -1,5 +1,6 @@
 //! The part of a scene file that does not depend on the shader: object, camera, distances, bound, output.
 
+use super::Host;
 use super::camera::{Around, Sphere, spread};
 use super::file::{SceneFile, Toml, suggest};
 use super::gltf::Model;
@@ -81,6 +82,7 @@ pub(super) struct Settings {
     pub(super) nearest: f64,
     pub(super) farthest: f64,
     pub(super) reading: BoundReading,
+    pub(super) host: Host,
     pub(super) offsets: usize,
     pub(super) pixels_per_degree: f64,
     pub(super) output: Output,
@@ -217,6 +219,9 @@ impl Settings {
                     let known = [BoundReading::Excess, BoundReading::Paper].map(BoundReading::name);
                     suggest(error, name.get_ref(), &known)
                 })?,
+            },
+            host: Host {
+                parameters: file.host.parameters,
             },
             offsets: whole("offsets", &file.offsets, OFFSETS, 1, MOST_OFFSETS)? as usize,
             pixels_per_degree: number(

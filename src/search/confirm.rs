@@ -4,7 +4,9 @@
 use super::descend::Confirmed;
 use super::error::{Details, exceeds};
 use super::guard::Guard;
+use super::kept::Kept;
 use super::levels::{Level, threshold};
+use super::parameters;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
@@ -144,11 +146,24 @@ impl<'a> Checks<'a> {
         &self,
         Confirmed { recipe, measured }: &Confirmed,
         search: &SampleSet<'_>,
+        kept: &Kept,
     ) -> Option<Level> {
         let start = self.start();
         let distance = start.distance();
-        let recipe = minimal(self.base, recipe);
-        let shader = recipe.replay(self.base).ok()?;
+        let mut recipe = minimal(self.base, recipe);
+        let mut shader = recipe.replay(self.base).ok()?;
+        let mut work = measured.work;
+        let mut with_parameters = None;
+        if let Some((longer, moved)) = parameters::with_exact(&recipe, &shader, kept)
+            && let Ok(measured) = start.measure(&moved)
+            && measured.work.total() < work.total()
+        {
+            if self.stand.scene.host.parameters {
+                (recipe, shader, work) = (longer, moved, measured.work);
+            } else {
+                with_parameters = Some(measured.work.total() / start.original().work.total());
+            }
+        }
         Some(Level {
             autolod: threshold(self.stand.scene, distance),
             distance,
@@ -157,8 +172,9 @@ impl<'a> Checks<'a> {
             flip: start.flip(&shader).ok()?,
             held_out: None,
             shader,
-            work: measured.work,
-            cost: measured.work.total() / start.original().work.total(),
+            work,
+            cost: work.total() / start.original().work.total(),
+            with_parameters,
             error_after: error_after(self.base, &recipe, search),
             recipe,
         })

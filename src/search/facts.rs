@@ -50,14 +50,15 @@ impl SampleSet<'_> {
             .flat_map_iter(|frame| frame.drawings.iter().map(move |drawing| (frame, drawing)))
             .map(|(frame, drawing)| {
                 let mut shading = Shading::default();
-                let bindings = &frame.frame.bindings;
+                let (frame, _) = programs.bound(&frame.frame);
+                let bindings = &frame.bindings;
                 let Some(seen) = &drawing.seen else {
-                    let coverage = drawing.covered(&programs, &frame.frame);
+                    let coverage = drawing.covered(&programs, &frame);
                     shade_into(program, &coverage, bindings, &mut shading);
                     return shading.profile;
                 };
                 let coverage = match programs.vertex {
-                    Some(_) => &drawing.with_inputs(&seen.coverage, &programs, &frame.frame),
+                    Some(_) => &drawing.with_inputs(&seen.coverage, &programs, &frame),
                     None => &seen.coverage,
                 };
                 let Some(weights) = &seen.weights else {

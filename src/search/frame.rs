@@ -77,8 +77,9 @@ pub(super) struct Executed {
     pub(super) work: Work,
     /// Covered fragments of the whole pictures.
     pub(super) drawn: usize,
-    /// What the vertex stage did more than the original's at all vertices, in full-rate scalar operations.
-    pub(super) at_vertices: f64,
+    /// What the vertex stage did more than the original's at all vertices, and the parameter stage for all draws, in
+    /// full-rate scalar operations.
+    pub(super) elsewhere: f64,
 }
 
 impl Rasterised {
@@ -193,9 +194,10 @@ impl Rasterised {
         let mut shading = Shading::default();
         let mut executed = Executed::default();
         let mut tally = Tally::new(&self.reference);
+        let (frame, of_draws) = programs.bound(&self.frame);
         for drawing in &self.drawings {
-            let coverage = drawing.covered(programs, &self.frame);
-            drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
+            let coverage = drawing.covered(programs, &frame);
+            drawing.shade(programs, &coverage, &frame.bindings, &mut shading);
             tally.add(&drawing.colours(&shading, self.reference.len(), output));
             executed.fragments += shading.profile.lanes;
             executed.work += shading.profile.work;
@@ -205,7 +207,7 @@ impl Rasterised {
                 work.total() / (*lanes).max(1) as f64
             };
             let more = (each(&coverage) - each(&drawing.coverage)).max(0.0);
-            executed.at_vertices += more * self.frame.mesh.positions.len() as f64;
+            executed.elsewhere += more * self.frame.mesh.positions.len() as f64 + of_draws;
         }
         (tally.finish(), executed)
     }
@@ -221,8 +223,9 @@ impl Rasterised {
             return (0.0, 0);
         };
         let mut shading = Shading::default();
-        let coverage = drawing.covered(programs, &self.frame);
-        drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
+        let (frame, _) = programs.bound(&self.frame);
+        let coverage = drawing.covered(programs, &frame);
+        drawing.shade(programs, &coverage, &frame.bindings, &mut shading);
         let colours = drawing.colours(&shading, self.reference.len(), output);
         self.reference.flip(&colours, pixels_per_degree)
     }
@@ -231,10 +234,11 @@ impl Rasterised {
     pub(super) fn differences(&self, programs: &[Programs], output: Output) -> Vec<Vec<[f32; 6]>> {
         let mut shading = Shading::default();
         let mut of_all = vec![Vec::new(); programs.len()];
-        for drawing in &self.drawings {
-            for (programs, differences) in programs.iter().zip(&mut of_all) {
-                let coverage = drawing.covered(programs, &self.frame);
-                drawing.shade(programs, &coverage, &self.frame.bindings, &mut shading);
+        for (programs, differences) in programs.iter().zip(&mut of_all) {
+            let (frame, _) = programs.bound(&self.frame);
+            for drawing in &self.drawings {
+                let coverage = drawing.covered(programs, &frame);
+                drawing.shade(programs, &coverage, &frame.bindings, &mut shading);
                 let colours = drawing.colours(&shading, self.reference.len(), output);
                 differences.extend(self.reference.differences(&colours));
             }

@@ -13,9 +13,10 @@ use super::best::best;
 use super::frontier::{Frontier, Seen};
 use super::guard::Guard;
 use super::interval::Interval;
+use super::parameters;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
-use lodc_passes::{Candidate, Fingerprint, PASSES, Recipe, Shader, recipe};
+use lodc_passes::{Candidate, Fingerprint, PASSES, Recipe, Shader, WITH_PARAMETERS, recipe};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -181,11 +182,13 @@ impl Descent<'_, '_> {
         loop {
             let facts = self.interval.start().facts(&current.shader);
             // What is exact was done before, or is not wanted.
-            let passes = PASSES.iter().filter(|pass| !pass.is_exact());
+            let host = self.interval.start().stand.scene.host;
+            let asking = WITH_PARAMETERS.iter().filter(|_| host.parameters);
+            let passes = PASSES.iter().filter(|pass| !pass.is_exact()).chain(asking);
             let kept = self.guard.kept();
             let candidates: Vec<Candidate> = passes
                 .flat_map(|pass| pass.candidates(&current.shader, &facts))
-                .filter(|candidate| !kept.refuses(candidate))
+                .filter(|candidate| !parameters::is_exact(candidate) && !kept.refuses(candidate))
                 .collect();
             let mut step = Step {
                 keys: candidates.iter().map(key).collect(),

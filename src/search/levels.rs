@@ -14,6 +14,7 @@ use super::greedy::{Prices, Variant};
 use super::guard::Guard;
 use super::interval::Interval;
 use super::kept::Kept;
+use super::parameters;
 use super::samples::{SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
@@ -45,6 +46,9 @@ pub struct Level {
     pub work: Work,
     /// The work as a share of the original's at the same distance: an estimate of the run time.
     pub cost: f64,
+    /// What `cost` would be with all that is the same for a whole draw moved to parameters, where the host does not allow
+    /// that and it would be less.
+    pub with_parameters: Option<f64>,
     /// For each step of the recipe, the RMSE after it, over the samples that the search looked at.
     pub error_after: Vec<f64>,
 }
@@ -63,6 +67,7 @@ impl Level {
             held_out: None,
             work: set.original().work,
             cost: 1.0,
+            with_parameters: None,
             error_after: Vec::new(),
         }
     }
@@ -179,7 +184,13 @@ pub fn find(
         };
         let base = Variant::new(&search, Recipe::default(), exact.shader.clone())?;
         let before = &levels[levels.len() - 1];
-        let start = Variant::new(&search, before.recipe.clone(), before.shader.clone())?;
+        // What was moved exactly is chosen anew where the level ends.
+        let lossy = parameters::without_exact(&before.recipe);
+        let (recipe, shader) = match lossy.replay(&exact.shader) {
+            Ok(shader) if lossy != before.recipe => (lossy, shader),
+            _ => (before.recipe.clone(), before.shader.clone()),
+        };
+        let start = Variant::new(&search, recipe, shader)?;
         // What draws the same for less may be a level by itself.
         if exact.cost() < 1.0 - MERGE_BELOW {
             bottom.judge(&base)?;
@@ -193,7 +204,7 @@ pub fn find(
             ..
         } = bottom;
         variants = measured;
-        let found = found.and_then(|found| checks.level(&found, search.start()));
+        let found = found.and_then(|found| checks.level(&found, search.start(), kept));
         let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * before.cost;
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {

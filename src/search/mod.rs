@@ -26,6 +26,7 @@ mod guard;
 mod interval;
 mod kept;
 pub mod levels;
+mod parameters;
 mod programs;
 pub mod samples;
 

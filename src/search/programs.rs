@@ -1,8 +1,12 @@
-//! The programs that draw a variant: of its fragment stage, and of its vertex stage where it has one of its own.
+//! The programs that draw a variant: of its fragment stage, of its vertex stage where it has one of its own, and of its
+//! parameter stage.
 
+use crate::eval::parameters::ParameterStage;
 use crate::eval::program::{Program, Refused};
+use crate::eval::raster::Frame;
 use lodc_passes::{Fingerprint, Shader, Stage};
 use naga::{Expression, Handle};
+use std::borrow::Cow;
 
 /// What draws a variant over fragments that its original was rasterised to.
 #[derive(Debug)]
@@ -12,6 +16,8 @@ pub struct Programs {
     pub(super) vertex: Option<(Program, Option<Fingerprint>)>,
     /// What handing over costs a fragment beside what it costs the original's, in full-rate scalar operations.
     pub(super) handing_over: f64,
+    /// What fills the block that the others read.
+    pub(super) parameters: Option<ParameterStage>,
 }
 
 impl Programs {
@@ -26,18 +32,16 @@ impl Programs {
 
     /// The same with another program of its fragment stage.
     pub(super) fn with(shader: &Shader, fragment: Program) -> Result<Self, Refused> {
-        match shader.handing_over() {
-            None => Ok(Self {
-                fragment,
-                vertex: None,
-                handing_over: 0.0,
-            }),
-            Some(handing_over) => Ok(Self {
-                fragment,
-                vertex: vertex(shader)?,
-                handing_over,
-            }),
-        }
+        let handing_over = shader.handing_over();
+        Ok(Self {
+            fragment,
+            vertex: match handing_over {
+                Some(_) => vertex(shader)?,
+                None => None,
+            },
+            handing_over: handing_over.unwrap_or(0.0),
+            parameters: ParameterStage::of(shader)?,
+        })
     }
 
     /// Those of any shader with the original's inputs and positions, such as one that was emitted and read again: its
@@ -47,7 +51,28 @@ impl Programs {
             fragment,
             vertex: Some((vertex, None)),
             handing_over: 0.0,
+            parameters: None,
         }
+    }
+
+    /// The same with what fills the block that they read.
+    #[must_use]
+    pub fn with_parameters(self, parameters: ParameterStage) -> Self {
+        Self {
+            parameters: Some(parameters),
+            ..self
+        }
+    }
+
+    /// A frame with the parameters bound, and the work of their stage for all of its draws, in full-rate scalar operations.
+    pub(super) fn bound<'f>(&self, frame: &'f Frame) -> (Cow<'f, Frame>, f64) {
+        let Some(parameters) = &self.parameters else {
+            return (Cow::Borrowed(frame), 0.0);
+        };
+        let mut frame = frame.clone();
+        let draws = frame.mesh.draws().len();
+        let work = parameters.bind(&mut frame.bindings, draws);
+        (Cow::Owned(frame), work)
     }
 }
 
@@ -64,7 +89,12 @@ fn vertex(shader: &Shader) -> Result<Option<(Program, Option<Fingerprint>)>, Ref
         return Ok(None);
     };
     let program = Program::compile(shader.module(), entry, &[])?;
-    Ok(Some((program, shader.fingerprint_of(Stage::Vertex))))
+    // What reads parameters is not known by itself.
+    let identity = match shader.parameter_block() {
+        Some(_) => Some(shader.fingerprint()),
+        None => shader.fingerprint_of(Stage::Vertex),
+    };
+    Ok(Some((program, identity)))
 }
 
 #[cfg(test)]
@@ -74,8 +104,13 @@ mod tests {
     use crate::eval::draw::shade;
     use crate::eval::raster::{Frame, rasterize};
     use crate::front::Source;
-    use crate::scene::Scene;
-    use crate::search::{SampleSet, Samples, Stand};
+    use crate::scene::{Scene, Split};
+    use crate::search::best::best;
+    use crate::search::exact::Scope;
+    use crate::search::interval::Interval;
+    use crate::search::kept::Kept;
+    use crate::search::{Level, SampleSet, Samples, Stand, find};
+    use lodc_passes::to_parameter::ToParameter;
     use lodc_passes::vertex_motion::VertexMotion;
     use lodc_passes::{Pass, recipe};
     use std::path::Path;
@@ -139,5 +174,184 @@ mod tests {
             }
             assert!(seen > 1000, "{seen}");
         }
+    }
+
+    /// What is lit by a light that the scene samples, and has only that to vary with the draw.
+    const LIT: &str = "
+        struct Light { direction: vec3f, strength: f32 }
+        @group(0) @binding(0) var<uniform> light: Light;
+        @group(0) @binding(1) var<uniform> camera: mat4x4f;
+        struct Surface {
+            @builtin(position) clip: vec4f,
+            @location(0) normal: vec3f,
+            @location(1) uv: vec2f,
+        }
+        @vertex fn vs_main(@location(0) position: vec3f, @location(1) normal: vec3f, @location(2) uv: vec2f) -> Surface {
+            let grown = 1.0 + 0.1 * sin(light.strength) * cos(light.strength);
+            return Surface(camera * vec4f(position * grown, 1.0), normal, uv);
+        }
+        @fragment fn fs_main(in: Surface) -> @location(0) vec4f {
+            let towards = normalize(light.direction);
+            let rounded = in.normal + vec3f(0.3 * sin(9.0 * in.uv.x), 0.0, 4.0);
+            let lambert = max(dot(normalize(rounded), towards), 0.0);
+            let bright = pow(light.strength, 1.5) > 0.5;
+            var sum = 0.0;
+            for (var i = 0; i < 4; i++) {
+                sum += light.strength / f32(i + 2);
+            }
+            let colour = select(vec3f(0.5), vec3f(0.9, 0.8, 0.7), bright);
+            return vec4f(colour * (lambert + 0.1 * sum), 1.0);
+        }";
+
+    /// A scene of that, with the direction of the light spread between two.
+    fn lit_scene(source: &Source, resolution: u32) -> Scene {
+        let scene = format!(
+            "object = \"plane\"
+             resolution = [{resolution}, {resolution}]
+             [uniforms]
+             \"camera\" = \"model-view-projection\"
+             \"light.strength\" = {{ samples = [0.25, 0.9] }}
+             \"light.direction\" = {{ from = [-0.9, 0.2, 0.6], to = [0.9, 0.3, 0.6], count = 4 }}"
+        );
+        let scene = Scene::resolve(source, Some((Path::new("lit.toml"), &scene)));
+        scene.unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    #[test]
+    fn what_is_moved_to_parameters_exactly_leaves_the_same_picture() {
+        let source = Source::parse("lit.wgsl", LIT).expect("it parses");
+        let base = normal_form(&source).expect("it is small");
+        let scene = lit_scene(&source, 48);
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let set = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
+        let mut shader = base.clone();
+        let exact: Vec<_> = ToParameter
+            .candidates(&base, &set.facts(&base))
+            .into_iter()
+            .filter(|candidate| candidate.choice == "exact")
+            .collect();
+        for candidate in &exact {
+            shader = recipe::apply(&shader, candidate).expect("none takes another away");
+        }
+        let sites: Vec<&str> = exact.iter().map(|exact| exact.site.path()).collect();
+        assert_eq!(shader.parameters().len(), exact.len(), "{sites:?}");
+        assert!(exact.len() >= 4, "{sites:?}");
+        assert!(shader.reads_parameters(Stage::Vertex), "{sites:?}");
+        let moved = set.measure(&shader).expect("it runs");
+        let original = set.original();
+        assert_eq!(moved.error, original.error);
+        assert!(moved.work.operations() < 0.7 * original.work.operations());
+        // It is done once for all fragments of a draw.
+        assert!(
+            moved.work.moved > 0.0 && moved.work.moved < 1.0,
+            "{moved:?}"
+        );
+        let pictures = [&base, &shader].map(|shader| set.pictures(shader).expect("it runs"));
+        assert_eq!(pictures[0], pictures[1]);
+    }
+
+    #[test]
+    fn an_averaged_parameter_follows_a_light_that_a_constant_does_not() {
+        let source = Source::parse("lit.wgsl", LIT).expect("it parses");
+        let base = normal_form(&source).expect("it is small");
+        let scene = lit_scene(&source, 64);
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let distance = scene.distances[1];
+        let search = Interval::new(&stand, &[distance], Samples::Search).expect("it runs");
+        let facts = search.start().facts(&base);
+        let held_out = Samples::HeldOut(Split::Test);
+        let held_out = SampleSet::new(&stand, distance, held_out).expect("it runs");
+        let full = SampleSet::new(&stand, distance, Samples::Full).expect("it runs");
+        let mut excess = Vec::new();
+        for word in ["average", "mean"] {
+            let candidates = recipe::candidates(&base, &facts).into_iter();
+            let candidates = candidates.chain(ToParameter.candidates(&base, &facts));
+            let mut candidates = candidates.filter(|c| c.site.path() == "fs_main.lambert");
+            let candidate = candidates.find(|c| c.choice.starts_with(word));
+            let candidate = candidate.unwrap_or_else(|| panic!("{word} is offered"));
+            let shader = recipe::apply(&base, &candidate).expect("it was offered");
+            let measured = search.measure(&shader).expect("it runs");
+            // Both with the best numbers that there are.
+            let better = best(&search, &base, &candidate, &measured);
+            let shader = better.map_or(shader, |better| better.shader);
+            for set in [&full, &held_out] {
+                let error = set.measure(&shader).expect("it runs").error;
+                let added = error.square() - set.original().error.square();
+                excess.push(added.max(0.0).sqrt());
+            }
+        }
+        let [averaged, averaged_held_out, baked, baked_held_out] = excess[..] else {
+            panic!("{excess:?}");
+        };
+        println!("excess                 searched light   held-out light");
+        println!("averaged parameter     {averaged:14.4}   {averaged_held_out:14.4}");
+        println!("baked constant         {baked:14.4}   {baked_held_out:14.4}");
+        assert!(averaged < 0.5 * baked, "{excess:?}");
+        assert!(averaged_held_out < 0.5 * baked_held_out, "{excess:?}");
+    }
+
+    #[test]
+    fn levels_have_parameters_where_the_host_fills_them() {
+        let source = Source::parse("lit.wgsl", LIT).expect("it parses");
+        let base = normal_form(&source).expect("it is small");
+        let mut scene = lit_scene(&source, 32);
+        scene.distances = vec![scene.distances[0], scene.distances[2], scene.distances[4]];
+        scene.e_max = 0.01;
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let mut found = Vec::new();
+        for parameters in [false, true] {
+            scene.host.parameters = parameters;
+            let stand = Stand {
+                base: &base,
+                vertex: &vertex,
+                scene: &scene,
+            };
+            found.push(
+                find(&stand, (Scope::None, &Kept::default()), &|_| {})
+                    .expect("it runs")
+                    .levels,
+            );
+        }
+        let [without, with] = &found[..] else {
+            unreachable!("there are two");
+        };
+        assert!(with.len() > 1 && without.len() > 1);
+        let saved = without[1]
+            .with_parameters
+            .expect("the light's are the same for a draw");
+        assert!(saved < without[1].cost, "{saved} {}", without[1].cost);
+        assert!(
+            without
+                .iter()
+                .all(|level| level.shader.parameters().is_empty())
+        );
+        let moved = |level: &Level| {
+            let mut steps = level.recipe.0.iter();
+            steps.any(|step| step.pass == ToParameter.name())
+        };
+        assert!(moved(&with[1]), "{:?}", with[1].recipe);
+        for level in &with[1..] {
+            assert_eq!(moved(level), !level.shader.parameters().is_empty());
+            assert_eq!(level.with_parameters, None);
+            assert!(level.error.excess() <= level.error.bound);
+            let again = level.recipe.replay(&base).expect("it replays");
+            assert_eq!(again.fingerprint(), level.shader.fingerprint());
+        }
+        assert!(
+            with[1].cost < without[1].cost,
+            "{} {}",
+            with[1].cost,
+            without[1].cost
+        );
     }
 }

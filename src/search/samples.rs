@@ -324,7 +324,7 @@ impl<'a> SampleSet<'a> {
         let pictures = first_of_view.map(|frame| OverBlack {
             width: frame.width,
             height: frame.height,
-            pixels: shown(&pen, frame),
+            pixels: shown(&pen, &programs.bound(frame).0),
         });
         Ok(pictures.collect())
     }
@@ -398,10 +398,10 @@ impl<'a> SampleSet<'a> {
             all.fragments += executed.fragments;
             all.work += executed.work;
             all.drawn += executed.drawn;
-            all.at_vertices += executed.at_vertices;
+            all.elsewhere += executed.elsewhere;
         }
         let mut work = all.work * (1.0 / all.fragments.max(1) as f64);
-        work.moved = programs.handing_over + all.at_vertices / all.drawn.max(1) as f64;
+        work.moved = programs.handing_over + all.elsewhere / all.drawn.max(1) as f64;
         let frames = results.into_iter().map(|(view, (error, _))| (view, error));
         (Details::new(frames), work)
     }

@@ -10,6 +10,7 @@ mod blended;
 mod fixtures;
 mod levels;
 mod models;
+mod parameters;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod shaders;
