@@ -85,7 +85,8 @@ impl Pass {
     pub(super) fn new(gpu: &Gpu, stages: Stages<'_>, drawing: Drawing) -> Result<Self> {
         let place = free(&stages, 0);
         let (module, at) = stages.vertex;
-        let (module, at) = settled(gpu, (module, at), None, place)?;
+        let auto_lod = (stages.auto_lod).filter(|_| pipeline_constant(module).is_some());
+        let (module, at) = settled(gpu, (module, at), auto_lod, place)?;
         let layout = Layout::new(&module, at)?;
         let vertex = entry::vertex(&module, at, place);
         let (module, at) = stages.fragment;

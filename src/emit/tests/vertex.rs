@@ -487,11 +487,31 @@ mod pictures {
 
     use super::*;
     use crate::eval::draw::draw;
+    use crate::eval::machine::{Bindings, Resource};
     use crate::eval::program::Program;
     use crate::eval::raster::Frame;
     use crate::scene::Scene;
+    use lodc_passes::vertex_motion::VertexMotion;
+    use lodc_passes::{Facts, Pass};
     use naga::{Module, ShaderStage};
     use rayon::prelude::*;
+    use std::sync::Arc;
+
+    /// What a host binds for a module that reads its level from a uniform.
+    fn bound(bindings: &Bindings, module: &Module, autolod: f64) -> Bindings {
+        let mut bindings = bindings.clone();
+        let mut globals = module.global_variables.iter().map(|(_, global)| global);
+        let level = globals.find(|global| {
+            let name = global.name.as_deref().unwrap_or_default();
+            name.starts_with("level_of_detail")
+        });
+        if let Some(at) = level.and_then(|global| global.binding) {
+            let mut bytes = vec![0; 16];
+            bytes[..4].copy_from_slice(&(autolod as f32).to_le_bytes());
+            bindings.insert((at.group, at.binding), Resource::Buffer(Arc::new(bytes)));
+        }
+        bindings
+    }
 
     /// The bits of a picture.
     fn picture(module: &Module, source: &Source, frame: &Frame) -> Option<Vec<u32>> {
@@ -530,19 +550,33 @@ mod pictures {
                 "{path} alone\n{text}"
             );
         }
-        let files = emit(source, &base, levels, Output::default());
-        let text = files
-            .unwrap_or_else(|e| panic!("{path}: {e}"))
-            .swap_remove(0)
-            .1;
-        let text = String::from_utf8(text).expect("it is text");
+        let wanted = levels.iter().zip(&variants);
+        let wanted = wanted.map(|(level, variant)| (f64::from(level.autolod), variant));
+        let wanted: Vec<_> = std::iter::once((0.0, &original)).chain(wanted).collect();
+        let whole = |form| {
+            let files = emit(source, &base, levels, output(form, Target::Wgsl));
+            let mut files = files.unwrap_or_else(|e| panic!("{path}: {e}"));
+            String::from_utf8(files.swap_remove(0).1).expect("it is text")
+        };
+        let text = whole(Form::Uniform);
+        if text.contains("level_of_detail") {
+            let emitted = read_back(&text, source).unwrap_or_else(|e| panic!("{path}: {e}"));
+            for (autolod, wanted) in &wanted {
+                let frame = Frame {
+                    bindings: bound(&frame.bindings, &emitted.module, *autolod),
+                    ..frame.clone()
+                };
+                let drawn = picture(&emitted.module, source, &frame);
+                let place = format!("{path} by a uniform of {autolod}");
+                assert!(drawn.as_ref() == Some(wanted), "{place}\n{text}");
+            }
+        }
+        let text = whole(Form::Override);
         if !text.contains("override autoLOD") {
             return true;
         }
         let emitted = read_back(&text, source).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let wanted = levels.iter().zip(&variants);
-        let wanted = wanted.map(|(level, variant)| (f64::from(level.autolod), variant));
-        for (autolod, wanted) in std::iter::once((0.0, &original)).chain(wanted) {
+        for (autolod, wanted) in wanted {
             let constants = [("autoLOD".to_owned(), autolod)].into_iter().collect();
             let (module, _) = naga::back::pipeline_constants::process_overrides(
                 &emitted.module,
@@ -567,6 +601,30 @@ mod pictures {
             let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
             let levels = levels_of(&source, &base(&source));
             levels.is_some_and(|levels| drawn_alike(&path.to_string_lossy(), &source, &levels))
+        });
+        let drawn = drawn.count();
+        assert!(drawn > 10, "{drawn}");
+    }
+
+    #[test]
+    fn values_that_moved_to_the_vertices_are_drawn_as_their_variants() {
+        let paths = fixtures::complete();
+        let drawn = paths.par_iter().filter(|path| {
+            let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
+            let mut shader = base(&source);
+            let mut levels = Vec::new();
+            for autolod in [1.0, 2.0, 3.0] {
+                let candidates = VertexMotion.candidates(&shader, &Facts::default());
+                let Some(candidate) = candidates.get(candidates.len() / 2) else {
+                    break;
+                };
+                shader = VertexMotion.apply(&shader, candidate);
+                levels.push(EmitLevel {
+                    shader: shader.clone(),
+                    ..level(&source, autolod)
+                });
+            }
+            !levels.is_empty() && drawn_alike(&path.to_string_lossy(), &source, &levels)
         });
         let drawn = drawn.count();
         assert!(drawn > 10, "{drawn}");
