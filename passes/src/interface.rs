@@ -219,20 +219,22 @@ fn bindings<'a>(module: &'a Module, function: &'a Function) -> Vec<&'a Binding> 
     found
 }
 
+/// How many locations there may be.
+pub(crate) fn most_locations(shader: &Shader) -> usize {
+    let function = shader.function(Stage::Fragment);
+    let inputs = function.map_or(Vec::new(), |function| bindings(shader.module(), function));
+    let built_in = inputs.iter().filter(|binding| match binding {
+        Binding::BuiltIn(built_in) => !matches!(built_in, BuiltIn::Position { .. }),
+        Binding::Location { .. } => false,
+    });
+    (MOST_VARIABLES as usize).saturating_sub(built_in.count())
+}
+
 /// The first location that nothing is handed over at; `None` when there is no room for another variable.
 pub(crate) fn free_location(shader: &Shader) -> Option<u32> {
-    let function = shader.function(Stage::Fragment)?;
-    let inputs = bindings(shader.module(), function);
-    let counts =
-        |binding: &&&Binding| !matches!(binding, Binding::BuiltIn(BuiltIn::Position { .. }));
     let taken = locations(shader);
-    let built_in = inputs.iter().filter(counts).count()
-        - inputs
-            .iter()
-            .filter_map(|input| location(Some(input)))
-            .count();
     let free = (0..MOST_VARIABLES).find(|location| !taken.contains(location))?;
-    (taken.len() + built_in < MOST_VARIABLES as usize).then_some(free)
+    (taken.len() < most_locations(shader)).then_some(free)
 }
 
 /// The locations of either stage's side of the interface.

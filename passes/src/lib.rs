@@ -45,16 +45,13 @@ pub static PASSES: &[&dyn Pass] = &[
     &specialize::Specialize,
     &texture_removal::TextureRemoval,
     &op_removal::OpRemoval,
+    &vertex_motion::VertexMotion,
 ];
-
-/// Passes that are not searched yet: what they make cannot be emitted.
-pub static UNSEARCHED: &[&dyn Pass] = &[&vertex_motion::VertexMotion];
 
 /// Passes whose levels ask the host to fill a block of parameters: they are searched where it does.
 pub static WITH_PARAMETERS: &[&dyn Pass] = &[&to_parameter::ToParameter];
 
 /// Every pass that there is.
 pub fn all_passes() -> impl Iterator<Item = &'static dyn Pass> {
-    let all = PASSES.iter().chain(UNSEARCHED).chain(WITH_PARAMETERS);
-    all.copied()
+    PASSES.iter().chain(WITH_PARAMETERS).copied()
 }

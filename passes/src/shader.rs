@@ -5,7 +5,7 @@
 
 use crate::cost::{FLAT_WEIGHT, INTERPOLATION_WEIGHT};
 use crate::flow::Findings;
-use crate::interface::Authors;
+use crate::interface::{self, Authors};
 use crate::operands::User;
 use crate::places::Places;
 use naga::proc::{ResolveContext, TypeResolution};
@@ -289,6 +289,12 @@ impl Shader {
             .map_err(Box::new)
     }
 
+    /// How many locations there may be between the stages: WebGPU's default limit, less the built-in inputs of the
+    /// fragment stage that count as well.
+    pub fn most_locations(&self) -> usize {
+        interface::most_locations(self)
+    }
+
     /// What handing over the values costs that passes have moved to the vertex stage, for a fragment, in full-rate scalar
     /// operations; `None` when none has been moved, and the vertex stage reads no parameters: then it is the author's.
     pub fn handing_over(&self) -> Option<f64> {
@@ -310,13 +316,6 @@ impl Shader {
         });
         let own = !added.is_empty() || self.reads_parameters(Stage::Vertex);
         own.then(|| costs.fold(0.0, |sum, cost| sum + cost))
-    }
-
-    /// The identity of one stage: a hash of what its entry point does.
-    pub fn fingerprint_of(&self, stage: Stage) -> Option<Fingerprint> {
-        let declared = crate::fingerprint::Declared::of(&self.module);
-        let function = self.function(stage)?;
-        Some(crate::fingerprint::of_function(&declared, function))
     }
 
     /// The identity of the shader: a hash of what its entry points do.

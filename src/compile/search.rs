@@ -210,19 +210,56 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         lock.clone(),
         ready.lock(request, &found, &levels).to_toml().into_bytes(),
     ));
-    let report = Report::new(
-        &found,
-        &ready.base,
-        &ready.source,
-        &says,
-        ready.origin(request),
-    );
+    let mut origin = ready.origin(request);
+    let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
+    origin
+        .warnings
+        .extend(visible.iter().map(|w| w.message.clone()));
+    let report = Report::new(&found, &ready.base, &ready.source, &says, origin);
     files.push((request.beside("lod.json"), report.json().into_bytes()));
     request.spare(&files, &inputs)?;
     Ok(Compiled {
         files,
         report,
-        warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),
+        warnings: ready
+            .scene
+            .warnings
+            .iter()
+            .cloned()
+            .map(Box::new)
+            .chain(visible)
+            .collect(),
+    })
+}
+
+/// Says which bindings levels read in the vertex stage that the original reads in the fragment stage alone: a host may
+/// have laid them out for that one only.
+fn to_be_visible<'a>(
+    base: &Shader,
+    levels: impl Iterator<Item = &'a Shader>,
+) -> Option<Box<Diagnostic>> {
+    let read = |shader: &Shader| -> BTreeSet<String> {
+        let function = shader.function(Stage::Vertex);
+        let values = function.into_iter().flat_map(|f| f.expressions.iter());
+        values
+            .filter_map(|(_, expression)| match expression {
+                Expression::GlobalVariable(global) => {
+                    let variable = &shader.module().global_variables[*global];
+                    variable.name.clone().filter(|_| variable.binding.is_some())
+                }
+                _ => None,
+            })
+            .collect()
+    };
+    let before = read(base);
+    let names: BTreeSet<String> = levels
+        .flat_map(read)
+        .filter(|name| !before.contains(name))
+        .collect();
+    let names: Vec<String> = names.into_iter().map(|name| format!("`{name}`")).collect();
+    (!names.is_empty()).then(|| {
+        Diagnostic::warning(format!("the vertex stage of levels reads {} too", names.join(", ")))
+            .with_note("a bind group layout that shows them to the fragment stage alone has to show them to the vertex stage as well")
     })
 }
 

@@ -9,6 +9,7 @@ use super::error::Details;
 use super::kept::Kept;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Stand, Tiles};
+use crate::emit::shared_locations;
 use crate::eval::program::Refused;
 use lodc_passes::Shader;
 
@@ -28,6 +29,8 @@ pub(crate) struct Guard<'a> {
     tiles: Vec<SampleSet<'a>>,
     /// How much of its bound a variant may use up on the search set.
     limit: f64,
+    /// The levels that the shader has already: what all hand over from stage to stage has to have room.
+    levels: Vec<Shader>,
 }
 
 impl<'a> Guard<'a> {
@@ -38,7 +41,20 @@ impl<'a> Guard<'a> {
             kept,
             tiles: Vec::new(),
             limit: 1.0,
+            levels: Vec::new(),
         }
+    }
+
+    /// From now on a level is to stand beside another one.
+    pub(crate) fn beside(&mut self, level: Shader) {
+        self.levels.push(level);
+    }
+
+    /// Whether a shader of all levels has room for what this one hands over.
+    fn has_room(&self, shader: &Shader) -> bool {
+        let levels = self.levels.iter().chain([shader]);
+        shader.handing_over().is_none()
+            || shared_locations(self.stand.base, levels) <= self.stand.base.most_locations()
     }
 
     /// What it knows of an interval that starts at a distance.
@@ -61,6 +77,7 @@ impl<'a> Guard<'a> {
     pub(crate) fn allows(&self, shader: &Shader, measured: &Measured) -> bool {
         self.admits(measured)
             && self.kept.holds(shader)
+            && self.has_room(shader)
             && Programs::of(shader).is_ok_and(|programs| {
                 let mut sets = self.tiles.iter();
                 sets.all(|set| set.strain_of_tiles(&programs) <= 1.0)

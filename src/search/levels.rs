@@ -214,6 +214,7 @@ pub fn find(
         };
         if let Some(mut level) = next_level {
             level.held_out = Some(test(stand, &level)?);
+            guard.beside(level.shader.clone());
             levels.push(level);
         }
         before_checks = Some(checks);

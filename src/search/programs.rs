@@ -92,7 +92,7 @@ fn vertex(shader: &Shader) -> Result<Option<(Program, Option<Fingerprint>)>, Ref
     // What reads parameters is not known by itself.
     let identity = match shader.parameter_block() {
         Some(_) => Some(shader.fingerprint()),
-        None => shader.fingerprint_of(Stage::Vertex),
+        None => shader.stage_fingerprint(Stage::Vertex),
     };
     Ok(Some((program, identity)))
 }
