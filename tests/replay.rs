@@ -8,7 +8,7 @@ mod synthetic;
 
 use lodc::front::Source;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
-use lodc_passes::{Facts, PASSES, Pass, Shader, Stage, all_passes};
+use lodc_passes::{Facts, Pass, Shader, Stage, all_passes};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;

@@ -4,8 +4,8 @@
 //! textures and constants; the vertex stage is the user's own, hands those inputs over, and there is room for another.
 //!
 //! Effect. All that computes the value is copied to the end of the vertex stage, which hands the value over as another
-//! output; the users of the site use that input. What several moved values share is computed once. Loops are copied with
-//! the variables that they work on. A texture is read with an explicit level there, which the candidate carries for each
+//! output; the users of the site use that input. What several moved values share is computed once, but for loops: each
+//! value brings those that it needs, with the variables that they work on. A texture is read with an explicit level there, which the candidate carries for each
 //! read whose level was implicit: at first the level that the distance leads to; a search finds better ones.
 //! - `flat`: it is the same for a whole triangle, and is handed over as it is.
 //! - `affine`: it is an affine function of what is interpolated, so that it may be interpolated itself.

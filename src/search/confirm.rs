@@ -89,10 +89,26 @@ impl<'a> Checks<'a> {
         verdict.is_ok_and(|verdict| matches!(verdict.finding, Finding::Confirmed(_)))
     }
 
+    /// What a shader costs over its interval, as a share of the original's cost: what it does for fragments is that at the
+    /// start.
+    pub(super) fn cost(&self, shader: &Shader) -> Result<f64, Refused> {
+        let programs = Programs::of(shader)?;
+        let (_, measured) = self.start().in_full(&programs);
+        let mut work = measured.work;
+        if work.moved > 0.0 {
+            for set in &self.full[1..] {
+                work.moved += set.in_full(&programs).1.work.moved;
+            }
+            work.moved /= self.full.len() as f64;
+        }
+        Ok(work.total() / self.start().original().work.total())
+    }
+
     /// Draws a shader in full, over its whole interval.
     pub(super) fn judge(&self, shader: &Shader) -> Result<Verdict, Refused> {
         let programs = Programs::of(shader)?;
-        let mut start = None;
+        let mut start: Option<Measured> = None;
+        let mut moved = 0.0;
         let mut verdict = Verdict {
             finding: Finding::Over,
             strain_of_means: 0.0,
@@ -106,6 +122,11 @@ impl<'a> Checks<'a> {
             verdict.strain_of_means = verdict.strain_of_means.max(figures.strain_of_means());
             verdict.details.push(details);
             start.get_or_insert(measured);
+            // It weighs more the fewer fragments there are.
+            moved += measured.work.moved / self.full.len() as f64;
+        }
+        if let Some(start) = &mut start {
+            start.work.moved = moved;
         }
         if strain <= 1.0 {
             verdict.finding = start.map_or(Finding::Over, Finding::Confirmed);

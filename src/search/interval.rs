@@ -30,7 +30,7 @@ impl<'a> Interval<'a> {
     }
 
     /// Measures a variant at every distance: error and work are those at the start, the strain is the largest, the
-    /// load the mean.
+    /// load the mean, and what was moved to the vertices too, since it weighs more the fewer fragments there are.
     pub(crate) fn measure(&self, shader: &Shader) -> Result<Measured, Refused> {
         let programs = Programs::of(shader)?;
         let mut all = self.0.iter().map(|set| set.measure_programs(&programs));
@@ -39,7 +39,9 @@ impl<'a> Interval<'a> {
         for other in all {
             measured.strain = measured.strain.max(other.strain);
             measured.load += other.load;
+            measured.work.moved += other.work.moved;
         }
+        measured.work.moved /= self.0.len() as f64;
         measured.load /= self.0.len() as f64;
         Ok(measured)
     }

@@ -205,11 +205,14 @@ pub fn find(
         } = bottom;
         variants = measured;
         let found = found.and_then(|found| checks.level(&found, search.start(), kept));
-        let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * before.cost;
+        // What vertices do weighs more the farther away it is.
+        let cost_here = checks.cost(&before.shader)?;
+        let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * cost_here;
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {
             Some(level) if worth(&level) => Some(level),
-            _ if before.is_original || checks.hold(&before.shader) => None,
+            _ if before.is_original => None,
+            _ if cost_here <= 1.0 && checks.hold(&before.shader) => None,
             other => Some(other.unwrap_or_else(|| Level::original(stand, checks.start()))),
         };
         if let Some(mut level) = next_level {

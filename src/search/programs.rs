@@ -115,19 +115,100 @@ mod tests {
     use lodc_passes::{Pass, recipe};
     use std::path::Path;
 
+    /// A material of the repository and its scene, with so many pixels along an edge.
+    fn material(name: &str, pixels: u32) -> (Shader, Scene) {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let path = folder.join(name).with_extension("wgsl");
+        let source = Source::read(&path).expect("it parses");
+        let path = path.with_extension("toml");
+        let text = std::fs::read_to_string(&path).expect("it is there");
+        let lines = text.lines().filter(|line| !line.starts_with("resolution"));
+        let size = format!("resolution = [{pixels}, {pixels}]");
+        let lines: Vec<&str> = [&*size].into_iter().chain(lines).collect();
+        let scene = Scene::resolve(&source, Some((&path, &lines.join("\n"))));
+        let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+        (normal_form(&source).expect("it is small"), scene)
+    }
+
+    #[test]
+    fn exact_motion_changes_nothing_but_the_rounding_of_what_is_interpolated() {
+        let (mut flat, mut affine) = (0, 0);
+        for name in [
+            "pbr",
+            "gltf_pbr",
+            "car_paint",
+            "leather",
+            "clay",
+            "terrain_blend",
+        ] {
+            let (base, scene) = material(name, 48);
+            let original = fragment(&base, &[]).expect("it runs");
+            let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+            let frame = scene.frames(scene.nearest).remove(0);
+            let known = rasterize(&vertex, &original, &frame);
+            let before = shade(&original, &known, &frame.bindings);
+            for candidate in VertexMotion.candidates(&base, &lodc_passes::Facts::default()) {
+                if VertexMotion.class(&candidate) != lodc_passes::Class::Lossless {
+                    continue;
+                }
+                let shader = recipe::apply(&base, &candidate).expect("it was offered");
+                let own = Programs::of(&shader).expect("it runs");
+                let (own_vertex, _) = own.vertex.as_ref().expect("it has one of its own");
+                let more = known.with_inputs_of(own_vertex, &own.fragment, &frame);
+                let after = shade(&own.fragment, &more, &frame.bindings);
+                if candidate.choice == "flat" {
+                    assert_eq!(before.colours, after.colours, "{name}: {candidate}");
+                    flat += 1;
+                    continue;
+                }
+                affine += 1;
+                // Rounding moves a number by parts in 10^7; a highlight and a texture's steps magnify that.
+                let mut worst = 0.0_f32;
+                for (before, after) in before.colours.iter().zip(&after.colours) {
+                    for (before, after) in before.iter().zip(after) {
+                        worst = worst.max((before - after).abs() / before.abs().max(1.0));
+                    }
+                }
+                assert!(worst < 2e-3, "{name}: {candidate}: {worst}");
+            }
+        }
+        assert!(flat > 3 && affine > 3, "{flat} flat, {affine} affine");
+    }
+
+    #[test]
+    fn light_of_clay_at_the_vertices_of_a_sphere_is_cheap_and_looks_alike() {
+        let (base, scene) = material("clay", 128);
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let cost = |distance| {
+            let set = SampleSet::new(&stand, distance, Samples::Full).expect("it runs");
+            let candidates = VertexMotion.candidates(&base, &set.facts(&base));
+            let mut all = candidates.iter();
+            let light = all.find(|candidate| candidate.site.path() == "fs_main.light");
+            let light = light.expect("the light is offered");
+            let shader = recipe::apply(&base, light).expect("it was offered");
+            let figures = set.figures(&shader).expect("it runs");
+            assert!(figures.excess() < 0.002, "{figures:?}");
+            let work = set.measure(&shader).expect("it runs").work;
+            work.total() / set.original().work.total()
+        };
+        // From near there are more fragments than vertices, from afar fewer.
+        assert!(
+            cost(2.5) < 0.4 && cost(20.0) > 1.0,
+            "{} {}",
+            cost(2.5),
+            cost(20.0)
+        );
+    }
+
     #[test]
     fn inputs_that_are_added_to_known_fragments_are_those_of_a_picture_of_its_own() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
-        for material in ["car_paint", "ivy"] {
-            let path = folder.join(material).with_extension("wgsl");
-            let source = Source::read(&path).expect("it parses");
-            let path = path.with_extension("toml");
-            let text = std::fs::read_to_string(&path).expect("it is there");
-            let lines = text.lines().filter(|line| !line.starts_with("resolution"));
-            let lines: Vec<&str> = ["resolution = [48, 48]"].into_iter().chain(lines).collect();
-            let scene = Scene::resolve(&source, Some((&path, &lines.join("\n"))));
-            let scene = scene.unwrap_or_else(|e| panic!("{e}"));
-            let base = normal_form(&source).expect("it is small");
+        for name in ["car_paint", "ivy"] {
+            let (base, scene) = material(name, 48);
             let original = fragment(&base, &[]).expect("it runs");
             let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
             let stand = Stand {
@@ -137,7 +218,7 @@ mod tests {
             };
             let set = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
             let candidates = VertexMotion.candidates(&base, &set.facts(&base));
-            assert!(candidates.len() > 3, "{material}: {candidates:?}");
+            assert!(candidates.len() > 3, "{name}: {candidates:?}");
             let mut seen = 0;
             for candidate in candidates.iter().step_by(candidates.len() / 4) {
                 let shader = recipe::apply(&base, candidate).expect("it was offered");
