@@ -361,3 +361,95 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         false => shader,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::edit::New;
+    use crate::to_parameter::ToParameter;
+    use crate::{Candidate, Facts, Pass, normalize};
+
+    const LIT: &str = "
+        struct Light { direction: vec3f, strength: f32 }
+        @group(0) @binding(3) var<uniform> light: Light;
+        @fragment fn fs_main(@location(0) normal: vec3f) -> @location(0) vec4f {
+            let towards = normalize(light.direction);
+            let bright = pow(light.strength, 1.5);
+            let lambert = dot(normal, towards);
+            let shown = lambert * bright;
+            return vec4f(shown, normal);
+        }";
+
+    fn base() -> Shader {
+        let module = naga::front::wgsl::parse_str(LIT).expect("it parses");
+        normalize(&module, None, "fs_main", 1000).expect("it is small")
+    }
+
+    fn names(shader: &Shader) -> Vec<&str> {
+        let members = shader.parameters().iter();
+        members.filter_map(|m| m.name.as_deref()).collect()
+    }
+
+    /// The shader with a value of it made a number.
+    fn baked(shader: &Shader, path: &str) -> Shader {
+        let (stage, value) = shader.find(&path.into()).expect("the test names a value");
+        let mut edit = Edit::new(shader, stage);
+        edit.replace(value, New::Numbers(vec![0.5]));
+        edit.finish()
+    }
+
+    #[test]
+    fn members_are_in_the_order_of_their_names_and_go_with_their_last_reader() {
+        let base = base();
+        let exact = ToParameter.candidates(&base, &Facts::default());
+        let [towards, bright] = &exact[..] else {
+            panic!("{exact:?}");
+        };
+        let both = |order: [&Candidate; 2]| {
+            let moved = order.iter().fold(base.clone(), |shader, candidate| {
+                ToParameter.apply(&shader, candidate)
+            });
+            moved.validate().expect("it is valid");
+            moved
+        };
+        let shader = both([towards, bright]);
+        assert_eq!(names(&shader), ["bright", "towards"]);
+        assert_eq!(shader.fingerprint(), both([bright, towards]).fingerprint());
+        let block = shader.parameter_block().expect("it has one");
+        let at = |variable| {
+            let variable: &GlobalVariable = &shader.module().global_variables[variable];
+            variable.binding.map(|at| (at.group, at.binding))
+        };
+        assert_eq!(
+            (at(block.read), at(block.stored)),
+            (Some((0, 4)), Some((0, 5)))
+        );
+
+        let less = baked(&shader, "fs_main.lambert");
+        less.validate().expect("it is valid");
+        assert_eq!(names(&less), ["bright"]);
+        assert_eq!(less.parameters()[0].offset, 0);
+        let none = baked(&shader, "fs_main.shown");
+        none.validate().expect("it is valid");
+        assert_eq!(none.index(Stage::Parameter), None);
+        let variables = |shader: &Shader| shader.module().global_variables.len();
+        assert_eq!(variables(&none), variables(&base));
+    }
+
+    #[test]
+    fn the_stage_can_return_what_it_stores() {
+        let base = base();
+        let exact = ToParameter.candidates(&base, &Facts::default());
+        let shader = exact.iter().fold(base, |shader, candidate| {
+            ToParameter.apply(&shader, candidate)
+        });
+        let (module, entry) = shader.parameters_returned().expect("it has some");
+        let function = &module.entry_points[entry].function;
+        let ty = function.result.as_ref().map(|result| result.ty);
+        let returned = members(&module, ty.expect("it returns them"));
+        assert_eq!(returned.len(), 2);
+        assert!(returned.iter().all(|member| member.binding.is_some()));
+        let mut statements = function.body.iter();
+        assert!(statements.all(|s| !matches!(s, Statement::Store { .. })));
+    }
+}
