@@ -34,12 +34,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         vertex: &vertex,
         scene: &scene,
     };
+    let start = lock.exact.replay(&base).map_err(|e| e.to_string())?;
     println!("level  distance   bound  steps  numbers  excess  with plain ones");
     for (at, level) in (1..).zip(&lock.levels) {
         let distance = level.distance;
         let search = SampleSet::new(&stand, distance, Samples::Search).map_err(said)?;
         let full = SampleSet::new(&stand, distance, Samples::Full).map_err(said)?;
-        let (mut best, mut plain) = (base.clone(), base.clone());
+        let (mut best, mut plain) = (start.clone(), start.clone());
         let mut replaced = 0;
         for step in &level.recipe.0 {
             best = recipe::apply(&best, step).map_err(|e| e.to_string())?;

@@ -439,6 +439,72 @@ fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f { // lodc: keep
         assert_eq!(said, expected);
     }
 
+    /// A shader in its scene.
+    fn ready(text: &str) -> Ready {
+        let source = crate::front::Source::parse("marked.wgsl", text).expect("it parses");
+        let scene = "resolution = [32, 32]\nlevels = 3\ne_max = 0.2";
+        let path = std::path::Path::new("marked.toml");
+        let scene = crate::scene::Scene::resolve(&source, Some((path, scene)));
+        Ready {
+            request: crate::compile::Request::default(),
+            base: crate::compile::normal_form(&source).expect("it is small"),
+            scene: scene.unwrap_or_else(|e| panic!("{e}")),
+            scene_file: None,
+            source,
+        }
+    }
+
+    const MARKED: &str = "
+        fn wave(x: f32) -> f32 { let turned = sin(x * 7.0); return turned * turned; }
+        @fragment fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f {
+            let rim = pow(uv.x, 4.0) + 0.2 * uv.y; // keep
+            let glow = exp(uv.y) * 0.1; // most
+            // first
+            let ripple = wave(uv.x + uv.y) * 0.1;
+            return vec4f(rim, glow, ripple, 1.0);
+        }";
+
+    #[test]
+    fn a_statement_has_what_it_computes_declares_and_calls() {
+        let text = MARKED.replace("// keep", "// lodc: keep");
+        let text = text.replace("// most", "// lodc: max-error 0.02");
+        let text = text.replace("// first", "// lodc: remove-first");
+        let kept = ready(&text).kept(&[]).expect("they are known");
+        for path in ["fs_main.rim", "fs_main.rim.pow"] {
+            assert!(kept.values.contains(path), "{kept:?}");
+        }
+        assert_eq!(kept.most.get("fs_main.glow"), Some(&0.02), "{kept:?}");
+        assert!(!kept.most.contains_key("fs_main.rim"));
+        for path in ["fs_main.ripple", "fs_main.wave.turned"] {
+            assert!(kept.first.contains(path), "{kept:?}");
+        }
+        assert!(kept.read.is_empty());
+    }
+
+    #[test]
+    fn what_is_marked_stays_in_every_level() {
+        use crate::search::{Scope, Stand, find};
+        use lodc_passes::ValueId;
+        let levels = |text: &str| {
+            let ready = ready(text);
+            let vertex = ready.vertex().expect("lodc supplies one");
+            let stand = Stand {
+                base: &ready.base,
+                vertex: &vertex,
+                scene: &ready.scene,
+            };
+            let kept = ready.kept(&[]).expect("they are known");
+            let found = find(&stand, (Scope::Levels, &kept), &|_| {}).expect("it runs");
+            assert!(found.levels.len() > 1, "there is no level");
+            let rim = ValueId::from("fs_main.rim.pow");
+            let of = |level: &crate::search::Level| level.shader.find(&rim).is_some();
+            found.levels.iter().map(of).collect::<Vec<_>>()
+        };
+        assert!(levels(MARKED).contains(&false));
+        let marked = MARKED.replace("// keep", "// lodc: keep");
+        assert!(!levels(&marked).contains(&false));
+    }
+
     #[test]
     fn glsl_has_no_words_in_front_of_what_it_declares() {
         let text = "#version 450
