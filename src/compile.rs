@@ -15,6 +15,7 @@ mod kept;
 mod search;
 mod snapshot;
 
+pub use crate::emit::Files;
 #[cfg(feature = "search")]
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
@@ -63,9 +64,6 @@ pub struct Request {
     /// The command that reproduces the result, for the report.
     pub command: String,
 }
-
-/// Files to be written: names and contents.
-pub type Files = Vec<(PathBuf, Vec<u8>)>;
 
 impl Request {
     /// The name that all outputs begin with, `folder/rock` for `folder/rock.lod.wgsl`.
@@ -198,6 +196,7 @@ struct Relocked {
     base: Shader,
     levels: Vec<EmitLevel>,
     /// What has changed since, and does not matter for what is written.
+    #[allow(clippy::vec_box, reason = "as diagnostics are handed around")]
     warnings: Vec<Box<Diagnostic>>,
 }
 

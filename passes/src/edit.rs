@@ -411,7 +411,7 @@ impl<'a> Edit<'a> {
         }
         let stored = parameters::stored(body, &self.expressions);
         let (at, storage, mut components) = match stored {
-            Some((at, storage, components)) => (at, Some(storage), components.to_vec()),
+            Some(stored) => (stored.at, Some(stored.variable), stored.values.to_vec()),
             None => (body.len() - 1, None, Vec::new()),
         };
         let mut members = Vec::new();

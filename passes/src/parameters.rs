@@ -46,7 +46,7 @@ impl Shader {
     /// The parameter block, of a variant that has one.
     pub fn parameter_block(&self) -> Option<ParameterBlock> {
         let function = self.function(Stage::Parameter)?;
-        let (_, variable, _) = stored(&function.body, &function.expressions)?;
+        let Stored { variable, .. } = stored(&function.body, &function.expressions)?;
         Some(block_of(&self.module, variable))
     }
 
@@ -74,7 +74,7 @@ impl Shader {
         let entry = self.index(Stage::Parameter)?;
         let mut module = without(&self.module, entry);
         let mut function = self.module.entry_points[entry].function.clone();
-        let (at, _, _) = stored(&function.body, &function.expressions)?;
+        let Stored { at, .. } = stored(&function.body, &function.expressions)?;
         let Some(Statement::Store { value, .. }) = function.body.get(at) else {
             return None;
         };
@@ -106,11 +106,18 @@ impl Shader {
     }
 }
 
-/// The store of a parameter stage: its place in the body, the variable, and the values of the members.
-pub(crate) fn stored<'e>(
-    body: &Block,
-    expressions: &'e Arena<Expression>,
-) -> Option<(usize, Handle<GlobalVariable>, &'e [Handle<Expression>])> {
+/// The store of a parameter stage.
+pub(crate) struct Stored<'e> {
+    /// Its place in the body.
+    pub(crate) at: usize,
+    /// The variable.
+    pub(crate) variable: Handle<GlobalVariable>,
+    /// The values of the members.
+    pub(crate) values: &'e [Handle<Expression>],
+}
+
+/// Finds the store of a parameter stage.
+pub(crate) fn stored<'e>(body: &Block, expressions: &'e Arena<Expression>) -> Option<Stored<'e>> {
     let at = body
         .iter()
         .rposition(|statement| matches!(statement, Statement::Store { .. }))?;
@@ -119,7 +126,11 @@ pub(crate) fn stored<'e>(
     };
     match (&expressions[pointer], &expressions[value]) {
         (Expression::GlobalVariable(variable), Expression::Compose { components, .. }) => {
-            Some((at, *variable, components))
+            Some(Stored {
+                at,
+                variable: *variable,
+                values: components,
+            })
         }
         _ => None,
     }
@@ -348,10 +359,10 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         }
     }
     let function = &mut module.entry_points[entry].function;
-    if let Some((at, _, components)) = stored(&function.body, &function.expressions)
-        && let Statement::Store { value, .. } = function.body[at]
+    if let Some(stored) = stored(&function.body, &function.expressions)
+        && let Statement::Store { value, .. } = function.body[stored.at]
     {
-        let components = order.iter().map(|old| components[*old]).collect();
+        let components = order.iter().map(|old| stored.values[*old]).collect();
         function.expressions[value] = Expression::Compose { ty, components };
     }
     let shader = Shader::changed(module, ids, authors);

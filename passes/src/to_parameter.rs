@@ -707,9 +707,9 @@ impl OfStage<'_, '_> {
         };
         let block = flow.shader.parameter_block()?;
         let function = flow.shader.function(Stage::Parameter)?;
-        let (_, _, stored) = parameters::stored(&function.body, &function.expressions)?;
+        let stored = parameters::stored(&function.body, &function.expressions)?;
         matches!(flow.function.expressions[base], Expression::GlobalVariable(v) if v == block.read)
-            .then(|| stored.get(index as usize).copied())?
+            .then(|| stored.values.get(index as usize).copied())?
     }
 }
 

@@ -127,17 +127,15 @@ pub struct EmitLevel {
     pub says: String,
 }
 
+/// Files to be written: names and contents.
+pub type Files = Vec<(PathBuf, Vec<u8>)>;
+
 /// Emits a shader with its levels, which were made from its normal form, `base`. The files come back as names, to be put
 /// beside the source, and contents.
 ///
 /// # Errors
 /// As [`emit_as`].
-pub fn emit(
-    source: &Source,
-    base: &Shader,
-    levels: &[EmitLevel],
-    output: Output,
-) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+pub fn emit(source: &Source, base: &Shader, levels: &[EmitLevel], output: Output) -> Result<Files> {
     emit_as(source, base, levels, output, &stem(source))
 }
 
@@ -153,7 +151,7 @@ pub fn emit_as(
     levels: &[EmitLevel],
     output: Output,
     stem: &str,
-) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+) -> Result<Files> {
     check_thresholds(levels)?;
     let source = &*composed::composed(source)?;
     let written = |stem: String, text: String| {
@@ -187,7 +185,7 @@ fn written(
     text: &str,
     target: Target,
     stem: &str,
-) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+) -> Result<Files> {
     match target {
         Target::Wgsl => Ok(vec![(
             format!("{stem}.wgsl").into(),
@@ -208,7 +206,7 @@ pub(crate) fn one_level(
     at: usize,
     target: Target,
     (stem, name): (&str, &str),
-) -> Result<(Source, Vec<(PathBuf, Vec<u8>)>)> {
+) -> Result<(Source, Files)> {
     let source = &*composed::composed(source)?;
     let text = level_alone(source, levels, at, stem)?;
     let read = read_back(&text, source)?;

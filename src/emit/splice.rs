@@ -143,7 +143,7 @@ fn spliced(
         let number = number(levels, at + 1);
         write!(out, "\n// Level {number}. {says}\n").ok();
         if let Some(vertex) = &vertex.functions[at] {
-            write!(out, "{vertex}\n").ok();
+            writeln!(out, "{vertex}").ok();
         }
         write!(out, "{attribute}{function}").ok();
     }

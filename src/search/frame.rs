@@ -53,13 +53,16 @@ pub(super) struct Rasterised {
     reference: Arc<Reference>,
 }
 
+/// Coverages by the vertex stage that their inputs are of, the latest first.
+type Wider = VecDeque<(Option<Fingerprint>, Arc<Coverage>)>;
+
 /// A frame rasterised at one offset.
 pub(super) struct Drawing {
     pub(super) coverage: Arc<Coverage>,
     /// Where in a pixel it is sampled.
     offset: [f32; 2],
     /// With the inputs of variants that have a vertex stage of their own, known by the identity of that; the latest.
-    wider: Option<Mutex<VecDeque<(Option<Fingerprint>, Arc<Coverage>)>>>,
+    wider: Option<Mutex<Wider>>,
     /// What lights it, in a deferred scene.
     lit: Option<Lit>,
     /// Those fragments alone that the original shows, where others are shaded too and hidden afterwards.

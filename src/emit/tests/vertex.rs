@@ -31,12 +31,14 @@ fn fs_main(in: Varyings) -> @location(0) vec4f {
 }
 ";
 
+/// Location, name, type and value of something that is handed over.
+type Handed<'a> = (u32, &'a str, &'a str, &'a str);
+
 /// The author's text with a vertex stage that also hands over `name`, a `ty` that is `value`, and a fragment stage that
 /// returns `colour`.
-fn variant(text: &str, handed_over: &[(u32, &str, &str, &str)], colour: &str) -> Shader {
-    let each = |one: &dyn Fn(&(u32, &str, &str, &str)) -> String| -> String {
-        handed_over.iter().map(one).collect()
-    };
+fn variant(text: &str, handed_over: &[Handed<'_>], colour: &str) -> Shader {
+    let each =
+        |one: &dyn Fn(&Handed<'_>) -> String| -> String { handed_over.iter().map(one).collect() };
     let members = each(&|(at, name, ty, _)| format!("@location({at}) {name}: {ty},\n"));
     let values = each(&|(_, _, _, value)| format!(", {value}"));
     let arguments = each(&|(at, name, ty, _)| format!(", @location({at}) {name}: {ty}"));
