@@ -7,7 +7,7 @@ mod fixtures;
 
 use lodc::emit::{self, EmitLevel, Form, Output, Target};
 use lodc::front::Source;
-use lodc_passes::{Facts, PASSES, Shader, normalize};
+use lodc_passes::{Facts, Shader, all_passes, normalize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -136,7 +136,7 @@ fn simplified(base: &Shader, count: usize) -> Shader {
     let facts = Facts::default();
     let mut shader = base.clone();
     for step in 0..count {
-        let all = PASSES.iter().flat_map(|pass| {
+        let all = all_passes().flat_map(|pass| {
             let candidates = pass.candidates(&shader, &facts).into_iter();
             candidates.map(move |candidate| (pass, candidate))
         });

@@ -11,8 +11,10 @@
 //! A member that no stage reads any more goes, with what computed it, and with the last member the block.
 
 use crate::edit::{Edit, without};
+use crate::fingerprint::{Declared, of_function};
 use crate::interface::layout;
-use crate::shader::{Shader, Stage};
+use crate::live::keep_needed;
+use crate::shader::{Fingerprint, Shader, Stage, ValueId};
 use naga::{
     AddressSpace, Arena, Binding, Block, EntryPoint, Expression, Function, FunctionResult,
     GlobalVariable, Handle, Module, ResourceBinding, ShaderStage, Span, Statement, StorageAccess,
@@ -370,6 +372,87 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         // What computed it goes.
         true => Edit::new(&shader, Stage::Parameter).finish(),
         false => shader,
+    }
+}
+
+/// What a parameter stage does for some members of its block alone.
+#[derive(Clone, Debug)]
+pub struct ParameterPart {
+    /// A function that stores each of them by itself, and nothing else.
+    pub function: Function,
+    /// The id of each value; `None` for those that are made here.
+    pub ids: Vec<Option<ValueId>>,
+}
+
+impl Shader {
+    /// What the parameter stage does for the members at these places of the block; `None` without a block.
+    pub fn parameter_part(&self, places: &[usize]) -> Option<ParameterPart> {
+        let old = self.function(Stage::Parameter)?;
+        let Stored {
+            at,
+            variable,
+            values: components,
+        } = stored(&old.body, &old.expressions)?;
+        let mut function = old.clone();
+        let last = function.body.len();
+        function.body.cull(at..last);
+        let add = |function: &mut Function, expression: Expression| {
+            let is_emitted = !expression.needs_pre_emit();
+            let value = function.expressions.append(expression, Span::UNDEFINED);
+            if is_emitted {
+                let range = naga::Range::new_from_bounds(value, value);
+                function.body.push(Statement::Emit(range), Span::UNDEFINED);
+            }
+            value
+        };
+        let base = add(&mut function, Expression::GlobalVariable(variable));
+        for place in places {
+            let index = *place as u32;
+            let pointer = add(&mut function, Expression::AccessIndex { base, index });
+            let value = *components.get(*place)?;
+            let store = Statement::Store { pointer, value };
+            function.body.push(store, Span::UNDEFINED);
+        }
+        let kept = keep_needed(&function);
+        let ids = kept.origins.iter().map(|origin| {
+            let is_old = origin.index() < old.expressions.len();
+            is_old.then(|| self.id(Stage::Parameter, *origin).clone())
+        });
+        Some(ParameterPart {
+            ids: ids.collect(),
+            function: kept.function,
+        })
+    }
+
+    /// For each member of the block, the identity of what computes it: equal in two variants of a shader when they compute
+    /// it alike.
+    pub fn parameter_fingerprints(&self) -> Vec<Fingerprint> {
+        let Some(old) = self.function(Stage::Parameter) else {
+            return Vec::new();
+        };
+        let Some(Stored {
+            at,
+            values: components,
+            ..
+        }) = stored(&old.body, &old.expressions)
+        else {
+            return Vec::new();
+        };
+        let declared = Declared::of(&self.module);
+        let members = self.parameters().iter().zip(components);
+        let alone = members.map(|(member, value)| {
+            let mut function = old.clone();
+            let last = function.body.len();
+            let value = Some(*value);
+            let end = Block::from_vec(vec![Statement::Return { value }]);
+            function.body.splice(at..last, end);
+            function.result = Some(FunctionResult {
+                ty: member.ty,
+                binding: None,
+            });
+            of_function(&declared, &keep_needed(&function).function)
+        });
+        alone.collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
 use super::{Files, Request, normal_form, relative};
-use crate::emit::{self, EmitLevel, Form, Lock, Output, figure};
+use crate::emit::{self, EmitLevel, Lock, Output, figure};
 use crate::eval::draw::shade;
 use crate::eval::machine::MAX_ROUNDS;
 use crate::eval::program::{Program, Refused};
@@ -186,9 +186,6 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let trial = request.emitted((&ready.source, &ready.base), &[], emission)?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
-    if ready.scene.host.parameters && emission.form != Form::Files {
-        return Err(emit::no_parameters(emission.form));
-    }
 
     let stand = Stand {
         base: &ready.base,

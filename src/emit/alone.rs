@@ -37,7 +37,6 @@ fn written_alone(
         .iter()
         .map(|e| e.name.as_str())
         .collect();
-    let fragment = level.shader.index(Stage::Fragment);
     let mut taken = Names::default();
     taken.reserve(text.words.iter().copied());
     let printed = print(
@@ -50,12 +49,10 @@ fn written_alone(
                 let Owner::EntryPoint(entry) = owner else {
                     return None;
                 };
-                let is_fragment = Some(entry) == fragment;
-                let stage = if is_fragment {
-                    Stage::Fragment
-                } else {
-                    Stage::Vertex
-                };
+                let stages = [Stage::Vertex, Stage::Fragment, Stage::Parameter];
+                let stage = stages
+                    .into_iter()
+                    .find(|stage| level.shader.index(*stage) == Some(entry))?;
                 value_name(&level.shader, stage, value)
             },
             short_types: text.uses_short_types(),
@@ -70,6 +67,12 @@ fn written_alone(
         .filter(|d| d.keyword == Keyword::Override)
         .map(|d| d.name.as_str())
         .chain(entries.iter().copied())
+        // The parameter stage may have had to give its name away.
+        .chain(
+            (printed.items.iter())
+                .filter(|item| item.text.starts_with("@compute"))
+                .map(|item| item.name.as_str()),
+        )
         .collect();
     let own = |name: &str| text.declaration(name).filter(|_| !entries.contains(name));
     let mut needed = BTreeSet::new();

@@ -6,7 +6,7 @@ use super::{EmitLevel, file_name, flaw, read_back};
 use crate::front::Source;
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
-use naga::{Module, StructMember, TypeInner};
+use naga::{Module, Statement, StructMember, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A text with levels to be put behind it, and the module that it was parsed to.
@@ -126,6 +126,14 @@ pub(crate) fn renamed_module(body: &Body<'_>, level: &EmitLevel) -> Module {
         }
     }
     rename_other_structs(&mut module, body);
+    for entry in &mut module.entry_points {
+        let body = &mut entry.function.body;
+        if let Some(Statement::Return { value: None }) = body.last() {
+            // Nobody writes it.
+            let last = body.len() - 1;
+            body.cull(last..);
+        }
+    }
     for (_, variable) in module.global_variables.iter_mut() {
         if rename(&mut variable.name) {
             variable.init = None;

@@ -16,6 +16,8 @@ pub(crate) struct Control {
     pub(crate) root: String,
     /// What has to be declared for it.
     pub(crate) declaration: Option<String>,
+    /// How many bindings it takes behind the module's last one.
+    pub(crate) bindings: u32,
     /// Whether it is a pipeline constant.
     pub(crate) by_override: bool,
 }
@@ -67,6 +69,7 @@ impl Control {
             Form::Override | Form::Files => Self {
                 value: NAME.to_owned(),
                 root: NAME.to_owned(),
+                bindings: 0,
                 declaration: Some(format!(
                     "// Halvings of scale on screen since the nearest view; 0, the default, is the original.\n\
                      override {NAME}: f32 = 0.0;\n"
@@ -89,6 +92,7 @@ impl Control {
                          @group({group}) @binding({binding}) var<uniform> {variable}: {ty};\n"
                     )),
                     root: variable,
+                    bindings: 1,
                     by_override: false,
                 }
             }
@@ -103,6 +107,7 @@ impl Control {
             Some(Self {
                 value,
                 root: root.to_owned(),
+                bindings: 0,
                 declaration: None,
                 by_override,
             })
@@ -147,7 +152,7 @@ fn member_path(module: &Module, ty: naga::Handle<naga::Type>) -> Option<String> 
 }
 
 /// The binding behind the last one of the last group.
-fn free_binding(module: &Module) -> (u32, u32) {
+pub(crate) fn free_binding(module: &Module) -> (u32, u32) {
     module
         .global_variables
         .iter()

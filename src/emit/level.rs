@@ -1,7 +1,8 @@
 //! A level's stages as ordinary functions, which the entry points of the spliced text call.
 
 use super::body::{Body, renamed_module, unwritable};
-use super::print::{Owner, Printed, Wishes, print, value_name};
+use super::parameters::Block as ParameterBlock;
+use super::print::{Owner, Printed, Wishes, path_name, print, value_name};
 use super::varyings::{Varyings, location, outputs, same_place};
 use super::{EmitLevel, flaw};
 use crate::front::identifiers::Names;
@@ -14,24 +15,24 @@ use naga::{
     Statement, StructMember, Type, TypeInner,
 };
 
-/// The fragment stage of a level, written with what it needs.
+/// The fragment stage of a level, the one at this place in the list, written with what it needs.
 pub(crate) fn fragment_function(
     body: &Body<'_>,
-    level: &EmitLevel,
+    (at, level): (usize, &EmitLevel),
     name: &str,
+    block: Option<&ParameterBlock>,
     names: &Names,
 ) -> Result<Printed> {
     let (mut module, mut function) = stage_of(body, level, Stage::Fragment)?;
+    if let Some(block) = block {
+        block.put_into((at, level), &mut module, &mut function);
+    }
     if let Some(result) = &mut function.result {
         result.binding = None;
     }
-    written(
-        body,
-        level,
-        (&mut module, function, Stage::Fragment),
-        (name, None),
-        names,
-    )
+    let keep = block.map_or(Vec::new(), |block| block.names().to_vec());
+    let value = named(level, Stage::Fragment);
+    written(body, (&mut module, function), (name, &keep), &value, names)
 }
 
 /// What the vertex stage of a shader with several levels returns: a struct of what the author's does and of what levels
@@ -51,10 +52,13 @@ pub(crate) fn vertex_function(
     body: &Body<'_>,
     (at, level): (usize, &EmitLevel),
     name: &str,
-    handed_over: Option<&HandedOver<'_>>,
+    (handed_over, block): (Option<&HandedOver<'_>>, Option<&ParameterBlock>),
     names: &Names,
 ) -> Result<Printed> {
     let (mut module, mut function) = stage_of(body, level, Stage::Vertex)?;
+    if let Some(block) = block {
+        block.put_into((at, level), &mut module, &mut function);
+    }
     if let Some(handed_over) = handed_over {
         let own = &handed_over.varyings.of_levels[at];
         if handed_over
@@ -67,9 +71,39 @@ pub(crate) fn vertex_function(
     } else if let Some(result) = &mut function.result {
         result.binding = None;
     }
-    let stage = (&mut module, function, Stage::Vertex);
-    let returned = handed_over.map(|handed_over| handed_over.name);
-    written(body, level, stage, (name, returned), names)
+    let mut keep = block.map_or(Vec::new(), |block| block.names().to_vec());
+    keep.extend(handed_over.map(|handed_over| handed_over.name));
+    let value = named(level, Stage::Vertex);
+    written(body, (&mut module, function), (name, &keep), &value, names)
+}
+
+/// What the parameter stage of a level does for the members at these places of its own block, written with what it needs.
+pub(crate) fn parameter_function(
+    body: &Body<'_>,
+    (at, level): (usize, &EmitLevel),
+    members: &[usize],
+    name: &str,
+    block: &ParameterBlock,
+    names: &Names,
+) -> Result<Printed> {
+    let (mut module, _) = stage_of(body, level, Stage::Parameter)?;
+    let Some(part) = level.shader.parameter_part(members) else {
+        let error = Diagnostic::error("internal error: a level has no parameter stage");
+        return Err(flaw(error, body.source));
+    };
+    let mut function = part.function;
+    block.put_into((at, level), &mut module, &mut function);
+    let value = |value: Handle<Expression>| {
+        let id = part.ids.get(value.index())?.as_ref()?;
+        Some(path_name(&level.shader, id.path()))
+    };
+    written(
+        body,
+        (&mut module, function),
+        (name, &block.names()),
+        &value,
+        names,
+    )
 }
 
 /// A level's module without its entry points, and the function of one of them, without the attributes of its arguments.
@@ -88,18 +122,14 @@ fn stage_of(body: &Body<'_>, level: &EmitLevel, stage: Stage) -> Result<(Module,
     Ok((module, function))
 }
 
-/// Writes a level's function under a name, and the struct that it returns under another.
+/// Writes a level's function under a name, and what else is there under the names to keep. `value` names its values.
 fn written(
     body: &Body<'_>,
-    level: &EmitLevel,
-    (module, mut function, stage): (&mut Module, Function, Stage),
-    (name, returned): (&str, Option<&str>),
+    (module, mut function): (&mut Module, Function),
+    (name, keep): (&str, &[&str]),
+    value: &dyn Fn(Handle<Expression>) -> Option<String>,
     names: &Names,
 ) -> Result<Printed> {
-    let values = level
-        .shader
-        .function(stage)
-        .map_or(0, |function| function.expressions.len());
     function.name = Some(name.to_owned());
     let handle = module.functions.append(function, Span::UNDEFINED);
     let mut outside = Names::default();
@@ -107,17 +137,24 @@ fn written(
     print(
         module,
         &Wishes {
-            keep: &|wish| wish == name || Some(wish) == returned || body.declared.contains(wish),
+            keep: &|wish| wish == name || keep.contains(&wish) || body.declared.contains(wish),
             taken: names,
             outside: &outside,
-            value: &|owner, value| {
-                let is_levels = owner == Owner::Function(handle) && value.index() < values;
-                is_levels.then(|| value_name(&level.shader, stage, value))?
-            },
+            value: &|owner, of| (owner == Owner::Function(handle)).then(|| value(of))?,
             short_types: body.text.uses_short_types(),
         },
     )
     .map_err(|reason| unwritable(body.source, &reason))
+}
+
+/// Names the values that a stage of a level had before it was changed here.
+fn named(level: &EmitLevel, stage: Stage) -> impl Fn(Handle<Expression>) -> Option<String> {
+    let function = level.shader.function(stage);
+    let values = function.map_or(0, |function| function.expressions.len());
+    move |value| {
+        let is_levels = value.index() < values;
+        is_levels.then(|| value_name(&level.shader, stage, value))?
+    }
 }
 
 impl HandedOver<'_> {

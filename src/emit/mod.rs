@@ -17,6 +17,7 @@ pub(crate) mod control;
 mod level;
 mod lines;
 mod lock;
+mod parameters;
 mod print;
 mod says;
 mod source;
@@ -153,10 +154,6 @@ pub fn emit_as(
     stem: &str,
 ) -> Result<Files> {
     check_thresholds(levels)?;
-    let mut stages = levels.iter().map(|level| level.shader.parameter_block());
-    if output.form != Form::Files && stages.any(|block| block.is_some()) {
-        return Err(no_parameters(output.form));
-    }
     let source = &*composed::composed(source)?;
     let written = |stem: String, text: String| {
         let read = read_back(&text, source)?;
@@ -255,15 +252,6 @@ fn check_thresholds(levels: &[EmitLevel]) -> Result<()> {
         before = level.autolod;
     }
     Ok(())
-}
-
-/// Says that a form has no place for the blocks of parameters, of which each level has its own.
-pub(crate) fn no_parameters(form: Form) -> Box<Diagnostic> {
-    Diagnostic::error(format!(
-        "levels with parameters cannot be written in the {} form: each has a block of its own",
-        form.name()
-    ))
-    .with_note("`--form files` writes one file a level; where the host fills no parameters, no level has a block")
 }
 
 fn no_override(target: Target) -> Box<Diagnostic> {

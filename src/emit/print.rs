@@ -452,8 +452,16 @@ pub(crate) fn value_name(
     stage: Stage,
     value: Handle<Expression>,
 ) -> Option<String> {
-    let entry = shader.entry_point(stage)?;
-    Some(short_name(shader.id(stage, value).path(), &entry.name))
+    shader.entry_point(stage)?;
+    Some(path_name(shader, shader.id(stage, value).path()))
+}
+
+/// A short name for a value of any stage: those of the parameter stage are called as where they came from.
+pub(crate) fn path_name(shader: &lodc_passes::Shader, path: &str) -> String {
+    let (first, _) = path.split_once('.').unwrap_or((path, ""));
+    let mut entries = shader.module().entry_points.iter();
+    let entry = entries.find(|entry| entry.name == first);
+    short_name(path, entry.map_or("", |entry| &entry.name))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::body::{Body, Hidden, over_text};
 use super::control::Control;
 use super::level::fragment_function;
 use super::lock::FORMAT;
+use super::parameters::Block;
 use super::print::{Item, Printed};
 use super::source::{Signature, Text};
 use super::varyings::Varyings;
@@ -72,6 +73,8 @@ fn spliced(
     // A level at 0 takes the place of the original, which nothing calls then.
     let zero = at_zero(levels).0;
     let numbers = number(levels, 1)..number(levels, 1) + levels.len();
+    let taken = (body.module, control.bindings);
+    let block = Block::of(levels, taken, &mut names);
     let mut chosen = |name: &String| Chosen::new(body, name, numbers.clone(), &control, &mut names);
     let vertex = vertex.map(&mut chosen).transpose()?;
     let fragment = chosen(&source.fragment)?;
@@ -90,13 +93,24 @@ fn spliced(
     let mut behind = Behind {
         body,
         names,
+        apart: block
+            .iter()
+            .flat_map(Block::names)
+            .map(str::to_owned)
+            .collect(),
         extra: Vec::new(),
     };
     let vertex = match &vertex {
         None => VertexStage::of_nobody(levels),
         Some(vertex) => {
             let stages = (vertex, &fragment);
-            let made = VertexStage::new(stages, base, (levels, &of_vertex), varyings, &mut behind)?;
+            let made = VertexStage::new(
+                stages,
+                base,
+                (levels, &of_vertex),
+                (varyings, block.as_ref()),
+                &mut behind,
+            )?;
             match made {
                 Ok(stage) => {
                     let head = vertex
@@ -134,7 +148,7 @@ fn spliced(
         .map_or(String::new(), |a| format!("{a}\n"));
     for (at, level) in levels.iter().enumerate() {
         let name = &fragment.functions[at + 1];
-        let printed = fragment_function(body, level, name, &behind.names)?;
+        let printed = fragment_function(body, (at, level), name, block.as_ref(), &behind.names)?;
         let function = match behind.take(&printed, name) {
             Ok(function) => function,
             Err(hidden) => return Ok(Err(hidden)),
@@ -146,6 +160,12 @@ fn spliced(
             writeln!(out, "{vertex}").ok();
         }
         write!(out, "{attribute}{function}").ok();
+    }
+    if let Some(block) = &block {
+        match block.written(levels, &mut behind)? {
+            Ok(text) => out.push_str(&text),
+            Err(hidden) => return Ok(Err(hidden)),
+        }
     }
     for item in &behind.extra {
         write!(out, "\n{}", item.text).ok();
@@ -206,6 +226,8 @@ impl Chosen {
 pub(crate) struct Behind<'b, 'a> {
     pub(crate) body: &'b Body<'a>,
     pub(crate) names: Names,
+    /// What is declared elsewhere.
+    apart: BTreeSet<String>,
     /// What the levels' functions need beside what the text declares.
     extra: Vec<Item>,
 }
@@ -225,7 +247,8 @@ impl Behind<'_, '_> {
             let Some(item) = printed.items.iter().find(|item| item.name == name) else {
                 continue;
             };
-            if self.body.declared.contains(&*name) || !done.insert(name.clone()) {
+            let is_there = self.body.declared.contains(&*name) || self.apart.contains(&name);
+            if is_there || !done.insert(name.clone()) {
                 continue;
             }
             if let Some(hidden) = self.body.hidden_from(item) {

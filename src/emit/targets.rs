@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 /// Writes an emitted module in another language: `stem.spv`, `stem.hlsl`, `stem.metal`, or `stem.vert.glsl` and
-/// `stem.frag.glsl`. Coordinates and binding numbers are those of the source.
+/// `stem.frag.glsl`, and `stem.comp.glsl` where there is a parameter block. Coordinates and binding numbers are those of the source.
 ///
 /// # Errors
 /// When the language, or naga's writer of it, has no form for something in the module.
@@ -42,6 +42,7 @@ pub(crate) fn write(
         .map(|name| (ShaderStage::Vertex, name)))
     .into_iter()
     .chain([(ShaderStage::Fragment, emitted.fragment.as_str())])
+    .chain(parameter_stage(source, emitted).map(|name| (ShaderStage::Compute, name)))
     .collect();
     // The writers panic on what they have no form for, such as an immediate without a place in HLSL.
     let written = catch_unwind(AssertUnwindSafe(|| {
@@ -55,6 +56,7 @@ pub(crate) fn write(
                 .map(|&(stage, name)| {
                     let extension = match stage {
                         ShaderStage::Vertex => "vert.glsl",
+                        ShaderStage::Compute => "comp.glsl",
                         _ => "frag.glsl",
                     };
                     Ok((extension, glsl(module, info, stage, name)?.into_bytes()))
@@ -71,6 +73,17 @@ pub(crate) fn write(
         .into_iter()
         .map(|(extension, bytes)| (format!("{stem}.{extension}").into(), bytes))
         .collect())
+}
+
+/// The entry point that fills the parameter block: of those for compute, the one that the source has not.
+fn parameter_stage<'a>(source: &Source, emitted: &'a Source) -> Option<&'a str> {
+    let names = |of: &'a Module| {
+        let entries = of.entry_points.iter();
+        let compute = entries.filter(|entry| entry.stage == ShaderStage::Compute);
+        compute.map(|entry| entry.name.as_str())
+    };
+    let authors = &source.module.entry_points;
+    names(&emitted.module).find(|name| authors.iter().all(|entry| entry.name != *name))
 }
 
 /// The module with the chosen entry points alone.

@@ -9,6 +9,7 @@
 use super::EmitLevel;
 use super::body::Hidden;
 use super::level::{HandedOver, vertex_function};
+use super::parameters::Block;
 use super::splice::{Behind, Chosen};
 use super::varyings::{Output, Varyings, outputs};
 use crate::Result;
@@ -76,7 +77,7 @@ impl VertexStage {
         (vertex, fragment): (&Chosen, &Chosen),
         base: &Shader,
         (levels, of_vertex): (&[EmitLevel], &[bool]),
-        mut varyings: Varyings,
+        (mut varyings, block): (Varyings, Option<&Block>),
         behind: &mut Behind<'_, '_>,
     ) -> Result<std::result::Result<Self, Hidden>> {
         let body = behind.body;
@@ -121,7 +122,7 @@ impl VertexStage {
             }
             let name = &*vertex.functions[at + 1];
             let over = handed_over.as_ref();
-            let printed = vertex_function(body, (at, level), name, over, &behind.names)?;
+            let printed = vertex_function(body, (at, level), name, (over, block), &behind.names)?;
             let function = match behind.take(&printed, name) {
                 Ok(function) => function,
                 Err(hidden) => return Ok(Err(hidden)),

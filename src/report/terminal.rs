@@ -141,7 +141,7 @@ fn with_parameters(report: &Report) -> String {
     match costs.is_empty() {
         true => String::new(),
         false => format!(
-            "  with --host parameters --form files, what is the same for a whole draw is computed once: cost {}\n",
+            "  with --host parameters, what is the same for a whole draw is computed once: cost {}\n",
             costs.join(", ")
         ),
     }
@@ -284,7 +284,7 @@ pub fn inspection(
     let left = [false, true, true, true, true, false, false, true];
     let table = columns(&rows, &left);
     let asks = match table.contains("*") {
-        true => "  * asks the host to fill a block: --host parameters --form files\n",
+        true => "  * asks the host to fill a block: --host parameters\n",
         false => "",
     };
     format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n{asks}")

@@ -14,6 +14,7 @@ mod parameters;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod shaders;
+mod vertices;
 mod worker;
 
 use lodc::compile::normal_form;

@@ -1,5 +1,6 @@
 //! Emission as a whole: small shaders for what is easily got wrong, and every shader under `testdata/`.
 
+mod parameters;
 mod vertex;
 
 use super::*;
@@ -602,7 +603,11 @@ mod meaning {
 
     /// What a module's fragment stage returns for fixed inputs, and which lanes it keeps; `None` when the evaluator
     /// does not run it.
-    fn outputs(module: &Module, name: &str, bindings: &Bindings) -> Option<(Vec<Words>, Mask)> {
+    pub(super) fn outputs(
+        module: &Module,
+        name: &str,
+        bindings: &Bindings,
+    ) -> Option<(Vec<Words>, Mask)> {
         let is_wanted = |e: &naga::EntryPoint| e.stage == ShaderStage::Fragment && e.name == name;
         let entry = module.entry_points.iter().position(is_wanted)?;
         let program = Program::compile(module, entry, &[]).ok()?;
