@@ -21,14 +21,14 @@ pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
 #[cfg(feature = "search")]
-pub use search::{Compiled, compile, inspect};
+pub use search::{Compiled, compile, inspect, trajectory};
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
 use crate::front::{self, Modules, Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Shader, normalize};
+use lodc_passes::{Goal, Shader, normalize};
 use std::path::{Path, PathBuf};
 
 /// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
@@ -44,6 +44,10 @@ pub struct Request {
     pub scene: Option<PathBuf>,
     /// How errors are held against the bound; by default as the scene says.
     pub bound: Option<BoundReading>,
+    /// What levels are to use less of; by default as the scene says.
+    pub goal: Option<Goal>,
+    /// The names of the passes that a level may cost error by; all when there are none.
+    pub only: Vec<String>,
     /// Whether the host fills the parameter block, beside what the scene says.
     pub parameters: bool,
     /// The shader to write; by default `<stem>.lod.wgsl` beside the source.

@@ -10,6 +10,7 @@ use crate::front::{Definition, Modules, Stages};
 use crate::search::Scope;
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
+use lodc_passes::Goal;
 use lodc_passes::autolod::BoundReading;
 use progress::Bar;
 use std::ffi::OsString;
@@ -197,6 +198,13 @@ struct CompileArgs {
     /// paper reads it [default: the scene's, else excess]
     #[arg(long, value_name = "excess|paper", value_parser = reading)]
     bound: Option<BoundReading>,
+    /// What levels are to use less of: time, accesses, textures, memory, operations, or several with their weights, such as
+    /// time=1,memory=0.2 [default: the scene's, else time]
+    #[arg(long, value_name = "GOAL")]
+    goal: Option<Goal>,
+    /// The passes that may cost error, such as texture-removal [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "PASSES")]
+    only: Vec<String>,
     /// Leaves out of the levels what the scene does not need, before anything that costs error
     #[arg(
         long,
@@ -450,6 +458,8 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
         }
     };
     request.keep = arguments.keep;
+    request.goal = arguments.goal;
+    request.only = arguments.only;
     request.command = command_line();
     let quiet = arguments.quiet;
     if arguments.locked {

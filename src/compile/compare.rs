@@ -16,9 +16,9 @@ use crate::report::{ComparedAt, Comparison, Input};
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::search::drawn::{Compiled, Device};
-use crate::search::{ErrorFigures, OverBlack, SampleSet, Stand, threshold};
+use crate::search::{ErrorFigures, Measured, OverBlack, SampleSet, Stand, threshold};
 use crate::{Diagnostic, Result};
-use lodc_passes::{Work, autolod};
+use lodc_passes::autolod;
 use naga::back::pipeline_constants::process_overrides;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -107,8 +107,8 @@ pub fn compare(request: &CompareRequest, goes_on: &dyn Fn()) -> Result<Compared>
         let other = (&specialised(&b.source, wanted)?, &b.scene);
         let judged = judge.judge(other, distance, request.images.is_some(), goes_on)?;
         let at = (distance, chooses.then_some(wanted));
-        let works = judged.works.as_ref();
-        distances.push(ComparedAt::new(at, &judged.error, judged.flip, works));
+        let measured = judged.measured.as_ref();
+        distances.push(ComparedAt::new(at, &judged.error, judged.flip, measured));
         if let (Some(folder), Some(pictures)) = (&request.images, judged.pictures) {
             files.extend(sheets(folder, distance, &pictures)?);
         }
@@ -129,7 +129,7 @@ struct Judged {
     error: ErrorFigures,
     flip: f64,
     /// Executed work of a covered fragment of the original and of the other, where it is counted.
-    works: Option<[Work; 2]>,
+    measured: Option<[Measured; 2]>,
     /// Of the original and of the other, when they are wanted.
     pictures: Option<[Vec<OverBlack>; 2]>,
 }
@@ -212,7 +212,7 @@ impl<'a> Judge<'a> {
                 Ok(Judged {
                     error,
                     flip,
-                    works: None,
+                    measured: None,
                     pictures,
                 })
             }
@@ -231,7 +231,7 @@ fn evaluated(
     Ok(Judged {
         error: b.figures(other)?,
         flip: b.flip(other)?,
-        works: Some([a.original().work, b.measure(other)?.work]),
+        measured: Some([a.original(), b.measure(other)?]),
         pictures: match wants_pictures {
             true => Some([a.pictures(original)?, b.pictures(other)?]),
             false => None,

@@ -375,6 +375,7 @@ impl Code<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compile::Request;
 
     const TEXT: &str = "\
 /* lodc: keep */ @group(0) @binding(1) var albedo: texture_2d<f32>;
@@ -469,7 +470,9 @@ fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f { // lodc: keep
         let text = MARKED.replace("// keep", "// lodc: keep");
         let text = text.replace("// most", "// lodc: max-error 0.02");
         let text = text.replace("// first", "// lodc: remove-first");
-        let kept = ready(&text).kept(&[]).expect("they are known");
+        let kept = ready(&text)
+            .kept(&Request::default())
+            .expect("they are known");
         for path in ["fs_main.rim", "fs_main.rim.pow"] {
             assert!(kept.values.contains(path), "{kept:?}");
         }
@@ -493,7 +496,7 @@ fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f { // lodc: keep
                 vertex: &vertex,
                 scene: &ready.scene,
             };
-            let kept = ready.kept(&[]).expect("they are known");
+            let kept = ready.kept(&Request::default()).expect("they are known");
             let found = find(&stand, (Scope::Levels, &kept), &|_| {}).expect("it runs");
             assert!(found.levels.len() > 1, "there is no level");
             let rim = ValueId::from("fs_main.rim.pow");

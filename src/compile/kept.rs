@@ -1,22 +1,26 @@
 //! What the user wants kept, by name: `--keep`.
 
+use super::Request;
 use super::search::Ready;
 use crate::front::names::nearest;
 use crate::search::{Kept, is_within};
 use crate::{Diagnostic, Result};
-use lodc_passes::{Stage, specialize};
+use lodc_passes::{Stage, all_passes, specialize};
 use naga::{Expression, Handle};
 use std::collections::BTreeSet;
 
 impl Ready {
     /// What is to be kept: textures, buffers and places in them, functions, and values by a part of their paths. And what the
-    /// comments of the shader say.
+    /// comments of the shader say, and the passes that may cost error.
     ///
     /// # Errors
-    /// When a name is none of these, and as [`Self::directives`].
-    pub(super) fn kept(&self, names: &[String]) -> Result<Kept> {
-        let mut kept = Kept::default();
-        for name in names {
+    /// When a name is none of these or names no pass, and as [`Self::directives`].
+    pub(super) fn kept(&self, request: &Request) -> Result<Kept> {
+        let mut kept = Kept {
+            only: passes(&request.only)?,
+            ..Kept::default()
+        };
+        for name in &request.keep {
             let variables = self.source.module.global_variables.iter();
             let is_variable = variables
                 .filter_map(|(_, variable)| variable.name.as_ref())
@@ -107,6 +111,21 @@ impl Ready {
             true => "name a texture, a uniform such as `material.flags`, a function, or a value that `lodc inspect` lists".to_owned(),
             false => format!("did you mean {}?", near.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
         })
+    }
+}
+
+/// The passes of these names.
+fn passes(names: &[String]) -> Result<BTreeSet<String>> {
+    let known: Vec<&str> = all_passes()
+        .filter(|pass| !pass.is_exact())
+        .map(|pass| pass.name())
+        .collect();
+    match names.iter().find(|name| !known.contains(&name.as_str())) {
+        Some(unknown) => Err(Diagnostic::error(format!(
+            "there is no pass `{unknown}` that costs error"
+        ))
+        .with_note(format!("such passes are {}", known.join(", ")))),
+        None => Ok(names.iter().cloned().collect()),
     }
 }
 

@@ -92,6 +92,7 @@ impl Read {
     /// With the scene as it is for this shader.
     pub(super) fn ready(self, mut scene: Scene) -> Ready {
         scene.reading = self.request.bound.unwrap_or(scene.reading);
+        scene.goal = self.request.goal.unwrap_or(scene.goal);
         scene.host.parameters |= self.request.parameters;
         Ready {
             request: self.request,
@@ -192,7 +193,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         vertex: &vertex,
         scene: &ready.scene,
     };
-    let kept = ready.kept(&request.keep)?;
+    let kept = ready.kept(request)?;
     let found = search::find(&stand, (request.exact, &kept), progress)
         .map_err(|refused| refused.at(&ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
@@ -211,6 +212,10 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         ready.lock(request, &found, &levels).to_toml().into_bytes(),
     ));
     let mut origin = ready.origin(request);
+    let reached = ready.has_nothing_to_save(&found);
+    origin
+        .warnings
+        .extend(reached.iter().map(|w| w.message.clone()));
     let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
     origin
         .warnings
@@ -228,6 +233,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
             .cloned()
             .map(Box::new)
             .chain(visible)
+            .chain(reached)
             .collect(),
     })
 }
@@ -276,6 +282,18 @@ fn emit_level((level, says): (&Level, &String)) -> EmitLevel {
 }
 
 impl Ready {
+    /// Says that the original uses nothing of what levels are to use less of.
+    fn has_nothing_to_save(&self, found: &Found) -> Option<Box<Diagnostic>> {
+        let goal = self.scene.goal;
+        let [original, _] = &found.exact.used;
+        goal.is_reached(original).then(|| {
+            Diagnostic::warning(format!(
+                "with the goal `{goal}` there is nothing to save: the original uses none of it"
+            ))
+            .with_note("leave `--goal` out: levels then save time")
+        })
+    }
+
     fn says(&self, level: &Level) -> String {
         match level.recipe.0.is_empty() {
             true if level.is_original => "the original".to_owned(),
@@ -326,6 +344,7 @@ impl Ready {
             seed: self.scene.seed,
             pixels_per_degree: self.scene.pixels_per_degree,
             bound: self.scene.reading.name(),
+            goal: self.scene.goal,
             inputs: self.read_files(),
             triangles: self.scene.mesh.indices.len() / 3,
             warnings: self
@@ -423,6 +442,7 @@ impl Ready {
                 .collect(),
             output: request.emission(Output::default()),
             bound: self.scene.reading,
+            goal: self.scene.goal,
             seed: self.scene.seed,
             rho0: figure(found.rho0),
             exact: match levels.is_empty() {
@@ -471,6 +491,25 @@ fn averaged<'a>(base: &'a Shader, recipe: &'a Recipe) -> impl Iterator<Item = St
                 };
             }
         })
+}
+
+/// The steps of the greedy loop from the original to its end at the scene's farthest distance, where no bound ends it: how
+/// far the goal of the request can be reached, and at what error.
+///
+/// # Errors
+/// As [`compile`].
+pub fn trajectory(request: &Request) -> Result<Vec<search::Step>> {
+    let ready = Ready::read(request)?;
+    let vertex = ready.vertex()?;
+    ready.ends(&vertex)?;
+    let stand = Stand {
+        base: &ready.base,
+        vertex: &vertex,
+        scene: &ready.scene,
+    };
+    let kept = ready.kept(request)?;
+    search::trajectory(&stand, &kept, ready.scene.farthest)
+        .map_err(|refused| refused.at(&ready.source))
 }
 
 /// Every candidate of a shader at the scene's middle distance, with what it is worth: for `lodc inspect`.

@@ -11,7 +11,7 @@ use super::{EmitLevel, Output};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Candidate, Recipe, ReplayError, Shader, all_passes};
+use lodc_passes::{Candidate, Goal, Recipe, ReplayError, Shader, all_passes};
 use serde::Deserialize;
 use std::fmt::Write;
 use std::ops::Range;
@@ -38,6 +38,8 @@ pub struct Lock {
     pub output: Output,
     /// How errors were held against the bound.
     pub bound: BoundReading,
+    /// What the levels were to use less of.
+    pub goal: Goal,
     /// The seed of everything that was drawn at random, below 2^63 (TOML has no larger integers).
     pub seed: u64,
     /// Pixels on screen per object unit at the nearest distance, where autoLOD is 0.
@@ -176,6 +178,9 @@ impl Lock {
         // The usual one is not said.
         if self.bound != BoundReading::default() {
             line(format!("bound = {}", string(self.bound.name())));
+        }
+        if self.goal != Goal::default() {
+            line(format!("goal = {}", string(&self.goal.to_string())));
         }
         line(format!("seed = {}", self.seed));
         line(format!("rho0 = {}", number(self.rho0)));
@@ -316,6 +321,11 @@ impl Lock {
             textures: raw.textures,
             output: raw.output,
             bound: raw.bound,
+            goal: match raw.goal {
+                None => Goal::default(),
+                Some(goal) => (goal.get_ref().parse())
+                    .map_err(|wrong: String| at(wrong, goal.span(), "here"))?,
+            },
             seed: raw.seed,
             rho0: raw.rho0,
             exact: recipe(raw.exact, &at)?,
@@ -497,6 +507,7 @@ struct RawLock {
     output: Output,
     #[serde(default)]
     bound: BoundReading,
+    goal: Option<Spanned<String>>,
     seed: u64,
     rho0: f64,
     #[serde(default)]
@@ -635,6 +646,7 @@ mod tests {
                 target: Target::Spirv,
             },
             bound: BoundReading::Paper,
+            goal: "time=1,memory=0.2".parse().expect("it is one"),
             seed: u64::from(u32::MAX) + 7,
             rho0: 211.34,
             exact: Recipe::default(),

@@ -3,8 +3,7 @@
 use super::terminal::columns;
 use super::{CostReport, ErrorReport, Input};
 use crate::Diagnostic;
-use crate::search::ErrorFigures;
-use lodc_passes::Work;
+use crate::search::{ErrorFigures, Measured};
 use serde::Serialize;
 
 /// One shader against another, as data.
@@ -60,30 +59,36 @@ pub struct ComparedAt {
 }
 
 impl ComparedAt {
-    /// From what was measured of the other shader against the original; `works` are of the original and of the other.
+    /// From what was measured of the other shader against the original; `measured` are the original and the other.
     pub(crate) fn new(
         (distance, autolod): (f64, Option<f64>),
         error: &ErrorFigures,
         flip: f64,
-        works: Option<&[Work; 2]>,
+        measured: Option<&[Measured; 2]>,
     ) -> Self {
         Self {
             distance,
             autolod,
             error: ErrorReport::new(error, flip, None),
             within: error.strain() <= 1.0,
-            cost: works.map(|[_, other]| CostReport {
-                operations: other.operations(),
-                texture_samples: other.samples,
+            cost: measured.map(|[original, other]| CostReport {
+                ratio: match original.cost > 0.0 {
+                    true => other.cost / original.cost,
+                    false => 1.0,
+                },
+                operations: other.used.work.operations(),
+                texture_samples: other.used.work.samples,
+                active_textures: other.used.textures,
+                active_texture_bytes: other.used.texture_bytes,
                 moved_operations: 0.0,
                 vertex_operations: 0.0,
                 parameters: 0,
                 ratio_with_parameters: None,
                 texture_bytes: 0,
             }),
-            ratio: works.and_then(|[original, other]| {
-                let total = original.total();
-                (total > 0.0).then(|| other.total() / total)
+            ratio: measured.and_then(|both| {
+                let [original, other] = both.map(|one| one.used.work.total());
+                (original > 0.0).then(|| other / original)
             }),
         }
     }

@@ -13,7 +13,7 @@ pub(super) fn report(found: &Found, base: &Shader, source: &Source) -> Option<Ex
     if exact.recipe.0.is_empty() {
         return None;
     }
-    let [before, after] = exact.work;
+    let [before, after] = exact.used.map(|used| used.work);
     Some(ExactReport {
         cost: exact.cost(),
         operations: [before.operations(), after.operations()],

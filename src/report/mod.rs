@@ -13,7 +13,7 @@ pub use terminal::{inspection, next, summary, table};
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
 use lodc_passes::recipe::pass;
-use lodc_passes::{Class, Recipe, Shader, Stage, cost};
+use lodc_passes::{Class, Goal, Recipe, Shader, Stage, cost};
 use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
@@ -33,6 +33,8 @@ pub struct Report {
     pub pixels_per_degree: f64,
     /// How errors were held against the bound: `excess` or `paper`.
     pub bound: &'static str,
+    /// What was to become cheaper: `time`, or as `--goal` says it.
+    pub goal: String,
     /// How many variants were measured.
     pub variants: u64,
     /// What costs no error, and is done before everything else that is done to a level; null when nothing was.
@@ -162,10 +164,16 @@ pub struct TimeReport {
 /// The work of a level.
 #[derive(Clone, Debug, Serialize)]
 pub struct CostReport {
+    /// What it costs by the goal, as a share of the original's.
+    pub ratio: f64,
     /// Arithmetic of a covered fragment, in full-rate scalar operations.
     pub operations: f64,
     /// Texture samples of a covered fragment.
     pub texture_samples: f64,
+    /// Textures that are bound, generated ones among them.
+    pub active_textures: u32,
+    /// Bytes of those with their MIP levels, at 4 bytes a texel.
+    pub active_texture_bytes: u64,
     /// What was moved to the vertices or to parameters and is done there, and what handing it over costs, in full-rate scalar operations a
     /// covered fragment.
     pub moved_operations: f64,
@@ -242,6 +250,8 @@ pub struct Origin {
     pub pixels_per_degree: f64,
     /// How errors were held against the bound.
     pub bound: &'static str,
+    /// What was to become cheaper.
+    pub goal: Goal,
     /// What was read.
     pub inputs: Vec<Input>,
     /// Triangles of the scene's mesh.
@@ -269,6 +279,7 @@ impl Report {
             rho0: found.rho0,
             pixels_per_degree: origin.pixels_per_degree,
             bound: origin.bound,
+            goal: origin.goal.to_string(),
             variants: found.variants,
             exact: exact::report(found, base, source),
             levels: found.levels.iter().zip(says).map(level).collect(),
@@ -337,15 +348,18 @@ fn level_report(
         time: TimeReport {
             kind: "estimated",
             ms: None,
-            ratio: level.cost,
+            ratio: level.time,
             low: None,
             high: None,
             adapter: None,
         },
         cost: CostReport {
-            operations: level.work.operations(),
-            texture_samples: level.work.samples,
-            moved_operations: level.work.moved,
+            ratio: level.cost,
+            operations: level.used.work.operations(),
+            texture_samples: level.used.work.samples,
+            active_textures: level.used.textures,
+            active_texture_bytes: level.used.texture_bytes,
+            moved_operations: level.used.work.moved,
             vertex_operations: of_vertex(&level.shader),
             parameters: level.shader.parameters().len() as u32,
             ratio_with_parameters: level.with_parameters,
@@ -399,7 +413,10 @@ fn frontier(at: &AtDistance) -> impl Iterator<Item = FrontierReport> + '_ {
     at.frontier.iter().map(|seen| FrontierReport {
         distance: at.distance,
         rmse: seen.square.sqrt(),
-        cost: seen.work.total() / at.original.total(),
+        cost: match at.original > 0.0 {
+            true => seen.cost / at.original,
+            false => 1.0,
+        },
         recipe: seen.recipe.0.iter().map(ToString::to_string).collect(),
     })
 }

@@ -75,9 +75,7 @@ pub fn summary(report: &Report) -> String {
     line("searched", &format!("{} variants", report.variants));
     out.push('\n');
     out.push_str(&table(report));
-    out.push_str(
-        "  cost is estimated, not timed: executed operations, a texture sample counted as 100\n",
-    );
+    out.push_str(&cost(report));
     out.push_str(&exact(report));
     out.push_str(&held_out(report));
     if report.bound == "paper" {
@@ -92,6 +90,23 @@ pub fn summary(report: &Report) -> String {
     }
     out.push('\n');
     out
+}
+
+/// What the costs are.
+fn cost(report: &Report) -> String {
+    let of_time = "executed operations, a texture sample counted as 100";
+    let what = match &*report.goal {
+        "time" => return format!("  cost is estimated, not timed: {of_time}\n"),
+        "accesses" => "texture accesses of a fragment",
+        "textures" => "textures that are bound",
+        "memory" => "bytes of the textures that are bound",
+        "operations" => "executed operations without texture samples",
+        mixed => {
+            let named = format!("{mixed}, each as a share of the original's; time is {of_time}");
+            return format!("  cost is a weighted mean: {named}\n");
+        }
+    };
+    format!("  cost is by the goal: {what}, as a share of the original's\n")
 }
 
 /// What costs no error, in a line; nothing where there is no such thing.
@@ -214,7 +229,7 @@ pub fn inspection(
             site.deviation = deviation.into_iter().reduce(f32::max);
         }
         let Some(measured) = measured else { continue };
-        let saved = 1.0 - measured.work.total() / original.work.total();
+        let saved = 1.0 - measured.cost / original.cost;
         let added = (measured.error.square() - original.error.square())
             .max(0.0)
             .sqrt();

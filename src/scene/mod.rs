@@ -43,12 +43,13 @@ use camera::{Around, Pose, Shot, Sphere};
 use chance::{child, unit};
 use file::Toml;
 use glam::{DMat4, DVec3};
+use lodc_passes::Goal;
 use lodc_passes::autolod::{self, BoundReading};
 use mesh::Mesh;
 use naga::{Binding, Span};
 use objects::Object;
 use settings::Settings;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -85,6 +86,8 @@ pub struct Scene {
     pub farthest: f64,
     /// How errors are held against the bound.
     pub reading: BoundReading,
+    /// What levels are to use less of.
+    pub goal: Goal,
     /// What the host does for levels.
     pub host: Host,
     /// How many offsets within a pixel errors are measured at.
@@ -198,6 +201,16 @@ struct Missing {
 }
 
 impl Scene {
+    /// Bytes of the textures at these groups and bindings, with their MIP levels, at 4 bytes a texel.
+    pub fn texture_bytes(&self, bindings: &BTreeSet<(u32, u32)>) -> u64 {
+        let bound = |texture: &&SceneTexture| bindings.contains(&(texture.group, texture.binding));
+        self.textures
+            .iter()
+            .filter(bound)
+            .map(SceneTexture::bytes)
+            .sum()
+    }
+
     /// Reads the scene of a shader: the file at `path`, or else the one beside the shader with its name
     /// and the extension `toml`, or else nothing but inferences.
     ///
@@ -381,6 +394,7 @@ impl Scene {
             nearest: settings.nearest,
             farthest: settings.farthest,
             reading: settings.reading,
+            goal: settings.goal,
             host: settings.host,
             offsets: settings.offsets,
             pixels_per_degree: settings.pixels_per_degree,

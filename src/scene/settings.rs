@@ -10,6 +10,7 @@ use crate::eval::draw::{Blend, DrawState};
 use crate::eval::raster::MAX_EDGE;
 use crate::{Diagnostic, Result};
 use glam::{DMat4, DVec3};
+use lodc_passes::Goal;
 use lodc_passes::autolod::{self, BoundReading};
 use std::ops::Range;
 use std::path::Path;
@@ -82,6 +83,7 @@ pub(super) struct Settings {
     pub(super) nearest: f64,
     pub(super) farthest: f64,
     pub(super) reading: BoundReading,
+    pub(super) goal: Goal,
     pub(super) host: Host,
     pub(super) offsets: usize,
     pub(super) pixels_per_degree: f64,
@@ -219,6 +221,11 @@ impl Settings {
                     let known = [BoundReading::Excess, BoundReading::Paper].map(BoundReading::name);
                     suggest(error, name.get_ref(), &known)
                 })?,
+            },
+            goal: match &file.goal {
+                None => Goal::default(),
+                Some(goal) => (goal.get_ref().parse())
+                    .map_err(|wrong: String| toml.error(wrong, goal.span(), ""))?,
             },
             host: Host {
                 parameters: file.host.parameters,

@@ -39,6 +39,18 @@ pub struct SceneTexture {
 }
 
 impl SceneTexture {
+    /// Bytes of its images with their MIP levels, at 4 bytes a texel.
+    pub fn bytes(&self) -> u64 {
+        let mut distinct: Vec<&Arc<Texture>> = Vec::new();
+        for image in &self.images {
+            if !distinct.iter().any(|known| Arc::ptr_eq(known, image)) {
+                distinct.push(image);
+            }
+        }
+        let levels = distinct.into_iter().flat_map(|image| image.levels());
+        levels.map(|level| 4 * level.texels.len() as u64).sum()
+    }
+
     /// What is bound.
     pub(super) fn resource(&self) -> Resource {
         per_draw(self.images.iter().cloned().map(Resource::Texture).collect())

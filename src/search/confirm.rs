@@ -94,14 +94,15 @@ impl<'a> Checks<'a> {
     pub(super) fn cost(&self, shader: &Shader) -> Result<f64, Refused> {
         let programs = Programs::of(shader)?;
         let (_, measured) = self.start().in_full(&programs);
-        let mut work = measured.work;
-        if work.moved > 0.0 {
+        let mut used = measured.used;
+        if used.work.moved > 0.0 {
             for set in &self.full[1..] {
-                work.moved += set.in_full(&programs).1.work.moved;
+                used.work.moved += set.in_full(&programs).1.used.work.moved;
             }
-            work.moved /= self.full.len() as f64;
+            used.work.moved /= self.full.len() as f64;
         }
-        Ok(work.total() / self.start().original().work.total())
+        let start = self.start();
+        Ok(start.share(start.cost(&used)))
     }
 
     /// Draws a shader in full, over its whole interval.
@@ -123,10 +124,11 @@ impl<'a> Checks<'a> {
             verdict.details.push(details);
             start.get_or_insert(measured);
             // It weighs more the fewer fragments there are.
-            moved += measured.work.moved / self.full.len() as f64;
+            moved += measured.used.work.moved / self.full.len() as f64;
         }
         if let Some(start) = &mut start {
-            start.work.moved = moved;
+            start.used.work.moved = moved;
+            start.cost = self.start().cost(&start.used);
         }
         if strain <= 1.0 {
             verdict.finding = start.map_or(Finding::Over, Finding::Confirmed);
@@ -173,16 +175,17 @@ impl<'a> Checks<'a> {
         let distance = start.distance();
         let mut recipe = minimal(self.base, recipe);
         let mut shader = recipe.replay(self.base).ok()?;
-        let mut work = measured.work;
+        let mut measured = *measured;
+        let original = start.original();
         let mut with_parameters = None;
         if let Some((longer, moved)) = parameters::with_exact(&recipe, &shader, kept)
-            && let Ok(measured) = start.measure(&moved)
-            && measured.work.total() < work.total()
+            && let Ok(less) = start.measure(&moved)
+            && less.cost < measured.cost
         {
             if self.stand.scene.host.parameters {
-                (recipe, shader, work) = (longer, moved, measured.work);
+                (recipe, shader, measured) = (longer, moved, less);
             } else {
-                with_parameters = Some(measured.work.total() / start.original().work.total());
+                with_parameters = Some(start.share(less.cost));
             }
         }
         Some(Level {
@@ -193,8 +196,9 @@ impl<'a> Checks<'a> {
             flip: start.flip(&shader).ok()?,
             held_out: None,
             shader,
-            work,
-            cost: work.total() / start.original().work.total(),
+            used: measured.used,
+            cost: start.share(measured.cost),
+            time: measured.used.work.total() / original.used.work.total(),
             with_parameters,
             error_after: error_after(self.base, &recipe, search),
             recipe,

@@ -89,7 +89,7 @@ impl Bottom<'_, '_> {
     /// What the cheapest confirmed variant costs.
     fn cost(&self) -> f64 {
         let found = self.found.as_ref();
-        found.map_or(f64::INFINITY, |found| found.measured.work.total())
+        found.map_or(f64::INFINITY, |found| found.measured.cost)
     }
 
     /// Goes down from the end of a way until all samples confirm where it ends.
@@ -157,7 +157,7 @@ impl Bottom<'_, '_> {
     pub(super) fn judge(&mut self, variant: &Variant) -> Result<Verdict, Refused> {
         let verdict = self.checks.judge(&variant.shader)?;
         match verdict.finding {
-            Finding::Confirmed(measured) if measured.work.total() < self.cost() => {
+            Finding::Confirmed(measured) if measured.cost < self.cost() => {
                 let recipe = variant.recipe.clone();
                 self.found = Some(Confirmed { recipe, measured });
             }
@@ -169,10 +169,10 @@ impl Bottom<'_, '_> {
 
     /// The cheapest variant that was seen beside the ways, is cheaper than what was found, and that the guard allows.
     fn shortcut(&self, taken: &mut Vec<Recipe>) -> Result<Option<Variant>, Refused> {
-        let share = self.cost() / self.checks.start().original().work.total();
-        let most = SHORTCUT * share * self.interval.start().original().work.total();
+        let share = self.cost() / self.checks.start().original().cost;
+        let most = SHORTCUT * share * self.interval.start().original().cost;
         let members = self.frontier.members().iter();
-        for seen in members.take_while(|seen| seen.work.total() < most) {
+        for seen in members.take_while(|seen| seen.cost < most) {
             if taken.contains(&seen.recipe) {
                 continue;
             }
@@ -219,7 +219,7 @@ impl Bottom<'_, '_> {
             .enumerate()
             .map(|(i, without)| {
                 let relief = whole.load - without.load;
-                let work = without.work.total() - whole.work.total();
+                let work = without.cost - whole.cost;
                 (relief / work.max(f64::MIN_POSITIVE), relief, i)
             })
             .filter(|(_, relief, _)| *relief > 0.0)
@@ -241,6 +241,6 @@ impl Bottom<'_, '_> {
         let variant = Variant::new(self.interval, kept, shader)?;
         let banned = left_out.iter().map(|i| &steps[*i]);
         let stop = Stop::without(variant, banned);
-        Ok(Some((stop, found.measured.work.total())))
+        Ok(Some((stop, found.measured.cost)))
     }
 }

@@ -5,10 +5,10 @@
 //! pictures, to the last bit of what is displayed; that is looked at.
 
 use super::kept::Kept;
-use super::samples::{SampleSet, Samples, Stand};
+use super::samples::{Measured, SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use lodc_passes::recipe::{self, Considered};
-use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, Work, cost, specialize};
+use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, Used, Work, cost, specialize};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -36,25 +36,28 @@ pub struct Exact {
     pub shader: Shader,
     /// What was thought of and declined, with the reason.
     pub declined: Vec<Considered>,
-    /// Executed work of a covered fragment at the nearest distance, of the original and without what costs no error.
-    pub work: [Work; 2],
+    /// What the original uses up at the nearest distance, and what is left without what costs no error.
+    pub used: [Used; 2],
+    /// What those cost by the goal.
+    pub(super) costs: [f64; 2],
 }
 
 impl Exact {
     /// Nothing is done. The set is of the nearest distance.
     pub(super) fn none(stand: &Stand<'_>, nearest: &SampleSet<'_>) -> Self {
-        let work = nearest.original().work;
+        let Measured { used, cost, .. } = nearest.original();
         Self {
             recipe: Recipe::default(),
             shader: stand.base.clone(),
             declined: Vec::new(),
-            work: [work, work],
+            used: [used, used],
+            costs: [cost, cost],
         }
     }
 
-    /// The work that is left, as a share of the original's.
+    /// The cost that is left, as a share of the original's.
     pub fn cost(&self) -> f64 {
-        self.work[1].total() / self.work[0].total()
+        self.costs[1] / self.costs[0]
     }
 
     /// Specialises a shader to its scene, but for what is to be kept. The set is all samples at the nearest distance.
@@ -92,10 +95,12 @@ impl Exact {
             if let Some((recipe, shader)) = made(recipe)
                 && nearest.same(stand.base, &shader)?
             {
+                let both = [nearest.original(), nearest.measure(&shader)?];
                 return Ok(Self {
                     recipe,
                     declined: declined(&sets[0], &shader),
-                    work: [nearest.original().work, nearest.measure(&shader)?.work],
+                    used: both.map(|one| one.used),
+                    costs: both.map(|one| one.cost),
                     shader,
                 });
             }
@@ -334,7 +339,7 @@ mod tests {
         // The product with the coat, and the sum with that product.
         assert_eq!(found.recipe.0.len(), 4, "{:?}", found.recipe);
         assert_eq!(found.shader.module().global_variables.len(), 3);
-        assert!(found.cost() < 1.0 && found.work[1].samples == 0.0);
+        assert!(found.cost() < 1.0 && found.used[1].work.samples == 0.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The Pareto frontier of error against cost over every variant that was seen. The error is the share of its bound
 //! that a variant uses up, where it uses up most.
 
-use lodc_passes::{Recipe, Work};
+use lodc_passes::Recipe;
 
 /// A variant as the search saw it: its derivation, its error and its cost on the search set.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,8 +12,8 @@ pub struct Seen {
     pub square: f64,
     /// How much of its bound it uses up there; feasible when at most 1.
     pub strain: f64,
-    /// Executed work of a covered fragment.
-    pub work: Work,
+    /// What it costs by the goal, as [`super::Measured::cost`] has it.
+    pub cost: f64,
 }
 
 /// The members that no other member beats in both error and cost, cheapest first.
@@ -25,20 +25,18 @@ pub struct Frontier {
 impl Frontier {
     /// Adds a variant, unless a member is at least as good in both, and drops those that it beats.
     pub fn add(&mut self, seen: Seen) {
-        let cost = seen.work.total();
+        let cost = seen.cost;
         if !(seen.strain.is_finite() && cost.is_finite()) {
             return;
         }
         // Members are sorted by cost up, and so by error down.
-        let at = self
-            .members
-            .partition_point(|member| member.work.total() <= cost);
+        let at = self.members.partition_point(|member| member.cost <= cost);
         if at > 0 && self.members[at - 1].strain <= seen.strain {
             return;
         }
         let same_cost = self.members[..at]
             .iter()
-            .rposition(|member| member.work.total() < cost)
+            .rposition(|member| member.cost < cost)
             .map_or(0, |last| last + 1);
         let beaten = self.members[at..]
             .iter()
@@ -62,10 +60,7 @@ mod tests {
             recipe: Recipe::default(),
             square: strain,
             strain,
-            work: Work {
-                simple: cost,
-                ..Work::default()
-            },
+            cost,
         }
     }
 
@@ -90,7 +85,7 @@ mod tests {
         let found: Vec<_> = frontier
             .members()
             .iter()
-            .map(|m| (m.work.total(), m.strain))
+            .map(|m| (m.cost, m.strain))
             .collect();
         assert_eq!(found, [(1.0, 9.0), (3.0, 4.0), (9.0, 0.5), (10.0, 0.0)]);
     }

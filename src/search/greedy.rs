@@ -54,7 +54,7 @@ impl Variant {
             recipe: self.recipe.clone(),
             square: self.measured.error.square(),
             strain: self.measured.strain,
-            work: self.measured.work,
+            cost: self.measured.cost,
         }
     }
 }
@@ -66,7 +66,7 @@ struct Price(f64, f64);
 
 impl Price {
     fn of(before: &Measured, after: &Measured) -> Option<Self> {
-        let saved = before.work.total() - after.work.total();
+        let saved = before.cost - after.cost;
         let added = after.load - before.load;
         if saved <= 0.0 || saved.is_nan() || added.is_nan() {
             return None;
@@ -187,6 +187,7 @@ impl Descent<'_, '_> {
             let passes = PASSES.iter().filter(|pass| !pass.is_exact()).chain(asking);
             let kept = self.guard.kept();
             let candidates: Vec<Candidate> = passes
+                .filter(|pass| kept.admits(pass.name()))
                 .flat_map(|pass| pass.candidates(&current.shader, &facts))
                 .filter(|candidate| !parameters::is_exact(candidate) && !kept.refuses(candidate))
                 .collect();
@@ -277,8 +278,7 @@ impl Descent<'_, '_> {
         for round in 0.. {
             step.measure(self, &batch, prices, over, frontier);
             *measured += batch.len() as u64;
-            let share =
-                step.current.measured.work.total() / self.interval.start().original().work.total();
+            let share = step.current.measured.cost / self.interval.start().original().cost;
             (self.progress)(*measured, share);
             let mut queue: Vec<(Price, usize)> = all
                 .clone()
@@ -354,7 +354,7 @@ impl Step<'_> {
                     recipe,
                     square: measured.error.square(),
                     strain: measured.strain,
-                    work: measured.work,
+                    cost: measured.cost,
                 });
                 let before = self.current.measured.error.square();
                 let added = (measured.error.square() - before).max(0.0).sqrt();

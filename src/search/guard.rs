@@ -45,6 +45,14 @@ impl<'a> Guard<'a> {
         }
     }
 
+    /// Nothing is over a bound: only what is to be kept counts.
+    pub(crate) fn unbounded(stand: &'a Stand<'a>, kept: &'a Kept) -> Self {
+        Self {
+            limit: f64::INFINITY,
+            ..Self::new(stand, kept)
+        }
+    }
+
     /// From now on a level is to stand beside another one.
     pub(crate) fn beside(&mut self, level: Shader) {
         self.levels.push(level);

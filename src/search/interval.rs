@@ -29,7 +29,7 @@ impl<'a> Interval<'a> {
         &self.0
     }
 
-    /// Measures a variant at every distance: error and work are those at the start, the strain is the largest, the
+    /// Measures a variant at every distance: error and cost are those at the start, the strain is the largest, the
     /// load the mean, and what was moved to the vertices too, since it weighs more the fewer fragments there are.
     pub(crate) fn measure(&self, shader: &Shader) -> Result<Measured, Refused> {
         let programs = Programs::of(shader)?;
@@ -39,9 +39,10 @@ impl<'a> Interval<'a> {
         for other in all {
             measured.strain = measured.strain.max(other.strain);
             measured.load += other.load;
-            measured.work.moved += other.work.moved;
+            measured.used.work.moved += other.used.work.moved;
         }
-        measured.work.moved /= self.0.len() as f64;
+        measured.used.work.moved /= self.0.len() as f64;
+        measured.cost = self.start().cost(&measured.used);
         measured.load /= self.0.len() as f64;
         Ok(measured)
     }

@@ -16,6 +16,8 @@ pub struct Kept {
     pub(crate) most: BTreeMap<String, f64>,
     /// Values whose changes are tried before others.
     pub(crate) first: BTreeSet<String>,
+    /// The passes that may cost error; all when there are none.
+    pub(crate) only: BTreeSet<String>,
 }
 
 impl Kept {
@@ -26,6 +28,11 @@ impl Kept {
                 let mut read = self.read.iter();
                 read.any(|read| is_within(&place, read) || is_within(read, &place))
             })
+    }
+
+    /// Whether a pass may be tried where it costs error.
+    pub(crate) fn admits(&self, pass: &str) -> bool {
+        self.only.is_empty() || self.only.contains(pass)
     }
 
     /// Whether everything that is to be kept is still in a shader.

@@ -18,7 +18,7 @@ use super::parameters;
 use super::samples::{SampleSet, Samples, Stand};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
-use lodc_passes::{Recipe, Shader, Work};
+use lodc_passes::{Recipe, Shader, Used};
 
 /// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
 const MERGE_BELOW: f64 = 0.04;
@@ -42,10 +42,12 @@ pub struct Level {
     pub flip: f64,
     /// Its error there on pictures that decided nothing.
     pub held_out: Option<HeldOut>,
-    /// Executed work of a covered fragment at `distance`.
-    pub work: Work,
-    /// The work as a share of the original's at the same distance: an estimate of the run time.
+    /// What it uses up at `distance`.
+    pub used: Used,
+    /// What it costs by the goal, as a share of the original's at the same distance.
     pub cost: f64,
+    /// The work as a share of the original's at the same distance: an estimate of the run time.
+    pub time: f64,
     /// What `cost` would be with all that is the same for a whole draw moved to parameters, where the host does not allow
     /// that and it would be less.
     pub with_parameters: Option<f64>,
@@ -65,8 +67,9 @@ impl Level {
             error: set.floor(),
             flip: set.flip(stand.base).unwrap_or(1.0),
             held_out: None,
-            work: set.original().work,
+            used: set.original().used,
             cost: 1.0,
+            time: 1.0,
             with_parameters: None,
             error_after: Vec::new(),
         }
@@ -77,8 +80,9 @@ impl Level {
         Self {
             is_original: false,
             shader: exact.shader.clone(),
-            work: exact.work[1],
+            used: exact.used[1],
             cost: exact.cost(),
+            time: exact.used[1].work.total() / exact.used[0].work.total(),
             ..Self::original(stand, nearest)
         }
     }
@@ -91,8 +95,8 @@ pub struct AtDistance {
     pub distance: f64,
     /// Its autoLOD value.
     pub autolod: f64,
-    /// The original's own work there.
-    pub original: Work,
+    /// What the original costs there by the goal.
+    pub original: f64,
     /// The original's `E^2` on the search set.
     pub floor_square: f64,
     /// Cheapest first.
@@ -151,6 +155,11 @@ pub fn find(
         true => Level::exact(stand, &nearest, &exact),
         false => Level::original(stand, &nearest),
     }];
+    // Where the original uses nothing of what is to become less, there is nothing to look for.
+    let distances = match scene.goal.is_reached(&nearest.original().used) {
+        true => &distances[..1],
+        false => &distances[..],
+    };
     drop(nearest);
     let mut seen = Vec::new();
     let mut prices = Prices::default();
@@ -225,7 +234,7 @@ pub fn find(
         seen.push(AtDistance {
             distance,
             autolod: scene.auto_lod(distance),
-            original: original.work,
+            original: original.cost,
             floor_square: original.error.square(),
             frontier: frontier.members().to_vec(),
             withdrawn,

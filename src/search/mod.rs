@@ -29,6 +29,7 @@ pub mod levels;
 mod parameters;
 mod programs;
 pub mod samples;
+mod trajectory;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
 pub use exact::{Exact, Scope};
@@ -41,3 +42,4 @@ pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, find};
 pub use programs::Programs;
 pub use samples::{Measured, OverBlack, SampleSet, Samples, Stand};
+pub use trajectory::{Step, trajectory};

@@ -4,9 +4,11 @@
 use crate::eval::parameters::ParameterStage;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::Frame;
+use lodc_passes::goal::active_textures;
 use lodc_passes::{Fingerprint, Shader, Stage};
 use naga::{Expression, Handle};
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 /// What draws a variant over fragments that its original was rasterised to.
 #[derive(Debug)]
@@ -18,6 +20,8 @@ pub struct Programs {
     pub(super) handing_over: f64,
     /// What fills the block that the others read.
     pub(super) parameters: Option<ParameterStage>,
+    /// Group and binding of the textures that they read, where that is known.
+    pub(super) textures: BTreeSet<(u32, u32)>,
 }
 
 impl Programs {
@@ -41,6 +45,7 @@ impl Programs {
             },
             handing_over: handing_over.unwrap_or(0.0),
             parameters: ParameterStage::of(shader)?,
+            textures: active_textures(shader),
         })
     }
 
@@ -52,6 +57,7 @@ impl Programs {
             vertex: Some((vertex, None)),
             handing_over: 0.0,
             parameters: None,
+            textures: BTreeSet::new(),
         }
     }
 
@@ -193,8 +199,8 @@ mod tests {
             let shader = recipe::apply(&base, light).expect("it was offered");
             let figures = set.figures(&shader).expect("it runs");
             assert!(figures.excess() < 0.002, "{figures:?}");
-            let work = set.measure(&shader).expect("it runs").work;
-            work.total() / set.original().work.total()
+            let work = set.measure(&shader).expect("it runs").used.work;
+            work.total() / set.original().used.work.total()
         };
         // From near there are more fragments than vertices, from afar fewer.
         assert!(
@@ -249,7 +255,7 @@ mod tests {
                 let by_both = Programs::new(own_vertex, by_both.fragment);
                 assert_eq!(measured.error, set.measure_programs(&by_both).error);
                 assert!(
-                    measured.work.moved > own.handing_over,
+                    measured.used.work.moved > own.handing_over,
                     "{candidate}: {measured:?}"
                 );
             }
@@ -326,10 +332,10 @@ mod tests {
         let moved = set.measure(&shader).expect("it runs");
         let original = set.original();
         assert_eq!(moved.error, original.error);
-        assert!(moved.work.operations() < 0.7 * original.work.operations());
+        assert!(moved.used.work.operations() < 0.7 * original.used.work.operations());
         // It is done once for all fragments of a draw.
         assert!(
-            moved.work.moved > 0.0 && moved.work.moved < 1.0,
+            moved.used.work.moved > 0.0 && moved.used.work.moved < 1.0,
             "{moved:?}"
         );
         let pictures = [&base, &shader].map(|shader| set.pictures(shader).expect("it runs"));

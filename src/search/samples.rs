@@ -9,7 +9,7 @@ use crate::scene::{
     Scene, Split,
     chance::{child, unit},
 };
-use lodc_passes::{Shader, Work};
+use lodc_passes::{Shader, Used};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -62,8 +62,10 @@ pub struct Measured {
     pub strain: f64,
     /// `E^2` less the original's, in units of the square of the bound: what a search weighs against work.
     pub load: f64,
-    /// Executed work of a covered fragment.
-    pub work: Work,
+    /// What it uses up: the executed work of a covered fragment, and textures.
+    pub used: Used,
+    /// What that costs by the scene's goal; with the original's a share, and of the time alone [`lodc_passes::Work::total`].
+    pub cost: f64,
 }
 
 /// A picture as a display shows it over black, one sample a pixel, at its centre.
@@ -87,7 +89,7 @@ pub struct SampleSet<'a> {
     /// Whether it has all that the strain asks for: whole tiles, at every offset.
     whole: bool,
     pub(super) frames: Vec<Rasterised>,
-    original: (Details, Work),
+    original: (Details, Used),
 }
 
 impl<'a> SampleSet<'a> {
@@ -365,7 +367,18 @@ impl<'a> SampleSet<'a> {
         ErrorFigures::new(details, &self.original.0, bound)
     }
 
-    fn judge(&self, (details, work): &(Details, Work)) -> Measured {
+    /// What a variant costs by the scene's goal.
+    pub(super) fn cost(&self, used: &Used) -> f64 {
+        self.stand.scene.goal.cost(used, &self.original.1)
+    }
+
+    /// A cost as a share of the original's; 1 where that costs nothing.
+    pub(super) fn share(&self, cost: f64) -> f64 {
+        let whole = self.cost(&self.original.1);
+        if whole > 0.0 { cost / whole } else { 1.0 }
+    }
+
+    fn judge(&self, (details, used): &(Details, Used)) -> Measured {
         let figures = self.figures_of(details);
         let added = details.error.square() - self.original.0.error.square();
         Measured {
@@ -375,7 +388,8 @@ impl<'a> SampleSet<'a> {
                 false => figures.strain_of_means(),
             },
             load: added / figures.bound.max(LEAST_BOUND).powi(2),
-            work: *work,
+            used: *used,
+            cost: self.cost(used),
         }
     }
 
@@ -386,7 +400,7 @@ impl<'a> SampleSet<'a> {
     }
 
     /// Draws every frame at every offset.
-    fn details(&self, programs: &Programs) -> (Details, Work) {
+    fn details(&self, programs: &Programs) -> (Details, Used) {
         let output = self.stand.scene.output;
         let results: Vec<_> = self
             .frames
@@ -403,7 +417,12 @@ impl<'a> SampleSet<'a> {
         let mut work = all.work * (1.0 / all.fragments.max(1) as f64);
         work.moved = programs.handing_over + all.elsewhere / all.drawn.max(1) as f64;
         let frames = results.into_iter().map(|(view, (error, _))| (view, error));
-        (Details::new(frames), work)
+        let used = Used {
+            work,
+            textures: programs.textures.len() as u32,
+            texture_bytes: self.stand.scene.texture_bytes(&programs.textures),
+        };
+        (Details::new(frames), used)
     }
 }
 
