@@ -85,6 +85,13 @@ impl Request {
         }
     }
 
+    /// The same without its folder.
+    fn stem(&self) -> String {
+        let base = self.base();
+        let name = base.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+
     /// The path of an output with this ending, such as `lod.toml`.
     fn beside(&self, ending: &str) -> PathBuf {
         let mut name = self.base().into_os_string();
@@ -113,8 +120,7 @@ impl Request {
         levels: &[EmitLevel],
         emission: Output,
     ) -> Result<Files> {
-        let base = self.base();
-        let stem = base.file_name().unwrap_or_default().to_string_lossy();
+        let stem = self.stem();
         let files = emit::emit_as(source, shader, levels, emission, &stem)?;
         Ok(self.placed(files, &stem))
     }

@@ -109,16 +109,21 @@ pub(crate) fn result(
 }
 
 /// A structure of these members, named after the author's.
-fn structure(
-    module: &mut Module,
-    name: Option<&str>,
-    mut members: Vec<StructMember>,
-) -> Handle<Type> {
+fn structure(module: &mut Module, name: Option<&str>, members: Vec<StructMember>) -> Handle<Type> {
     let name = name.unwrap_or("Vertex");
     let name = match name.ends_with(SUFFIX) {
         true => name.to_owned(),
         false => format!("{name}{SUFFIX}"),
     };
+    laid_out(module, name, members)
+}
+
+/// A structure of these members, one behind the other.
+pub(crate) fn laid_out(
+    module: &mut Module,
+    name: String,
+    mut members: Vec<StructMember>,
+) -> Handle<Type> {
     let (mut end, mut widest) = (0, 4);
     for member in &mut members {
         let (size, alignment) = layout(&module.types[member.ty].inner);

@@ -12,7 +12,7 @@
 
 use crate::edit::{Edit, without};
 use crate::fingerprint::{Declared, of_function};
-use crate::interface::layout;
+use crate::interface::laid_out;
 use crate::live::keep_needed;
 use crate::shader::{Fingerprint, Shader, Stage, ValueId};
 use naga::{
@@ -91,7 +91,7 @@ impl Shader {
                 per_primitive: false,
             });
         }
-        let ty = structure(&mut module, "Returned".into(), members);
+        let ty = laid_out(&mut module, "Returned".into(), members);
         if let Expression::Compose { ty: of, .. } = &mut function.expressions[value] {
             *of = ty;
         }
@@ -154,27 +154,10 @@ fn members(module: &Module, ty: Handle<Type>) -> &[StructMember] {
     }
 }
 
-/// A structure of these members, one behind the other.
-fn structure(module: &mut Module, name: String, mut members: Vec<StructMember>) -> Handle<Type> {
-    let (mut end, mut widest) = (0, 4);
-    for member in &mut members {
-        let (size, alignment) = layout(&module.types[member.ty].inner);
-        member.offset = u32::next_multiple_of(end, alignment);
-        end = member.offset + size;
-        widest = widest.max(alignment);
-    }
-    let inner = TypeInner::Struct {
-        members,
-        span: end.next_multiple_of(widest),
-    };
-    let name = Some(name);
-    module.types.insert(Type { name, inner }, Span::UNDEFINED)
-}
-
 /// Gives a block other members.
 fn change(module: &mut Module, block: ParameterBlock, members: Vec<StructMember>) -> Handle<Type> {
     let name = module.types[block.ty].name.clone().unwrap_or_default();
-    let ty = structure(module, name, members);
+    let ty = laid_out(module, name, members);
     for variable in [block.read, block.stored] {
         module.global_variables[variable].ty = ty;
     }
@@ -202,7 +185,7 @@ pub(crate) fn extended(
     }
     let taken = names(module);
     let [name, read, stored] = [TYPE, READ, STORED].map(|name| free(name, &taken));
-    let ty = structure(module, name, added.collect());
+    let ty = laid_out(module, name, added.collect());
     let bindings = module.global_variables.iter();
     let last = bindings
         .filter_map(|(_, variable)| variable.binding)

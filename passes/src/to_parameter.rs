@@ -573,12 +573,7 @@ impl<'a> Study<'a> {
             | Expression::Math { .. }
             | Expression::Relational { .. }
             | Expression::As { .. } => true,
-            // Made of one part, it says the same as the part, less plainly.
-            Expression::Compose { ref components, .. } => {
-                let mut parts = components.iter().filter(|part| !flow.is_constant(**part));
-                let first = parts.next();
-                parts.any(|part| Some(part) != first)
-            }
+            Expression::Compose { ref components, .. } => flow.joins(components),
             Expression::Load { pointer } => flow.local(pointer).is_some(),
             _ => false,
         };

@@ -465,12 +465,7 @@ impl<'a> Study<'a> {
             | Expression::ImageSample { .. }
             | Expression::ImageLoad { .. }
             | Expression::As { .. } => true,
-            // Made of one part, it says the same as the part, less plainly.
-            Expression::Compose { ref components, .. } => {
-                let mut parts = components.iter().filter(|part| !flow.is_constant(**part));
-                let first = parts.next();
-                parts.any(|part| Some(part) != first)
-            }
+            Expression::Compose { ref components, .. } => flow.joins(components),
             Expression::Load { pointer } => flow.local(pointer).is_some(),
             // All that is used of a vector.
             Expression::AccessIndex { base, .. } | Expression::Swizzle { vector: base, .. } => {

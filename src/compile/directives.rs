@@ -4,14 +4,15 @@
 //! about what comes next: a statement, a function, a texture or buffer. naga drops comments, so they are found here, and
 //! what they are about is told by where values come from.
 
-use super::kept::is_called;
+use super::kept::has_part;
 use super::search::Ready;
 use crate::Result;
-use crate::emit::tokens::{Kind, Token, tokens};
+use crate::emit::tokens::{Kind, Token, after_group, tokens};
 use crate::front::File;
 use crate::search::Kept;
 use lodc_passes::Stage;
 use naga::Expression;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// What a directive asks for.
@@ -51,11 +52,11 @@ struct Directive {
 type Wrong = (Range<usize>, String, &'static str);
 
 impl Ready {
-    /// Adds what the comments of the shader's files ask for.
+    /// Adds what the comments of the shader's files ask for; `read` is what its fragment stage reads.
     ///
     /// # Errors
     /// At a directive that is unknown, is about nothing, or bounds an error by no number.
-    pub(super) fn directives(&self, kept: &mut Kept) -> Result<()> {
+    pub(super) fn directives(&self, read: &BTreeSet<String>, kept: &mut Kept) -> Result<()> {
         for file in self.source.files() {
             let directives = directives(file.text).map_err(|(range, message, note)| {
                 let error = self.source.error(message, file.span(range), "here");
@@ -63,7 +64,7 @@ impl Ready {
             })?;
             for Directive { word, about } in directives {
                 if let (Word::Keep, About::Variable(name)) = (word, &about) {
-                    if self.read_names().contains(name) {
+                    if read.contains(name) {
                         kept.read.insert(name.clone());
                     }
                     continue;
@@ -94,13 +95,6 @@ impl Ready {
             true => entry,
             false => name,
         };
-        let within = |path: &str, wanted: &[&str]| {
-            let path: Vec<&str> = path.split('.').collect();
-            path.windows(wanted.len()).any(|steps| {
-                let mut pairs = steps.iter().zip(wanted);
-                pairs.all(|(step, wanted)| is_called(step, wanted))
-            })
-        };
         let called: Vec<&str> = match about {
             About::Statement { range, .. } => {
                 let text = &file.text[range.clone()];
@@ -112,12 +106,12 @@ impl Ready {
         };
         self.computed()
             .filter(|(value, path)| match about {
-                About::Function(name) => renamed(name) == entry || within(path, &[name]),
+                About::Function(name) => renamed(name) == entry || has_part(path, &[name]),
                 About::Variable(name) => {
                     let loads = |f: &naga::Function| {
                         matches!(f.expressions[*value], Expression::Load { .. })
                     };
-                    function.is_some_and(loads) && within(path, &[name])
+                    function.is_some_and(loads) && has_part(path, &[name])
                 }
                 About::Statement {
                     range,
@@ -135,8 +129,10 @@ impl Ready {
                     from_there
                         || declares
                             .as_ref()
-                            .is_some_and(|name| within(path, &[inside, name]))
-                        || called.iter().any(|called| within(path, &[inside, called]))
+                            .is_some_and(|name| has_part(path, &[inside, name]))
+                        || called
+                            .iter()
+                            .any(|called| has_part(path, &[inside, called]))
                 }
             })
             .map(|(_, path)| path.to_owned())
@@ -147,8 +143,12 @@ impl Ready {
 /// The directives of a text, in order.
 fn directives(text: &str) -> std::result::Result<Vec<Directive>, Wrong> {
     let all = tokens(text);
+    let code = Code {
+        text,
+        tokens: all.iter().filter(|token| token.is_significant()).collect(),
+    };
     let mut found = Vec::new();
-    for (at, token) in all.iter().enumerate() {
+    for token in &all {
         if token.kind != Kind::Comment {
             continue;
         }
@@ -156,7 +156,7 @@ fn directives(text: &str) -> std::result::Result<Vec<Directive>, Wrong> {
             continue;
         };
         let word = word(&words).map_err(|(message, note)| (token.span.clone(), message, note))?;
-        let about = about(text, &all, at).ok_or_else(|| {
+        let about = code.about_comment(&token.span).ok_or_else(|| {
             let message = "this directive is about nothing".to_owned();
             (
                 token.span.clone(),
@@ -202,27 +202,6 @@ fn word(words: &[&str]) -> std::result::Result<Word, (String, &'static str)> {
     }
 }
 
-/// What the comment at a place is about.
-fn about(text: &str, all: &[Token], comment: usize) -> Option<About> {
-    let place = all[comment].span.clone();
-    let code = Code {
-        text,
-        tokens: all.iter().filter(|token| token.is_significant()).collect(),
-    };
-    let next = code
-        .tokens
-        .iter()
-        .position(|token| token.span.start >= place.end);
-    let before = next.unwrap_or(code.tokens.len()).checked_sub(1);
-    let in_line = before.filter(|at| {
-        let between = &text[code.tokens[*at].span.end..place.start];
-        !between.contains(['\n', '\r'])
-    });
-    // What ends behind the comment is nothing that comes next.
-    let target = in_line.or_else(|| next.filter(|at| code.word(*at) != "}"))?;
-    code.about(target)
-}
-
 /// The tokens of a text that are no comments, cut into declarations and statements. WGSL and GLSL do that alike.
 struct Code<'a> {
     text: &'a str,
@@ -238,6 +217,20 @@ impl Code<'_> {
     fn is_word(&self, at: usize) -> bool {
         let token = self.tokens.get(at);
         token.is_some_and(|token| token.kind == Kind::Word)
+    }
+
+    /// What a comment at these bytes is about.
+    fn about_comment(&self, place: &Range<usize>) -> Option<About> {
+        let mut tokens = self.tokens.iter();
+        let next = tokens.position(|token| token.span.start >= place.end);
+        let before = next.unwrap_or(self.tokens.len()).checked_sub(1);
+        let in_line = before.filter(|at| {
+            let between = &self.text[self.tokens[*at].span.end..place.start];
+            !between.contains(['\n', '\r'])
+        });
+        // What ends behind the comment is nothing that comes next.
+        let target = in_line.or_else(|| next.filter(|at| self.word(*at) != "}"))?;
+        self.about(target)
     }
 
     /// What the innermost statement, or else the declaration, is that a token is in.
@@ -355,20 +348,7 @@ impl Code<'_> {
 
     /// The token behind the bracket that closes the one at a place.
     fn after_group(&self, at: usize) -> usize {
-        let mut depth = 0usize;
-        for token in at..self.tokens.len() {
-            match self.word(token) {
-                "(" | "[" | "{" => depth += 1,
-                ")" | "]" | "}" => {
-                    depth = depth.saturating_sub(1);
-                    if depth == 0 {
-                        return token + 1;
-                    }
-                }
-                _ => {}
-            }
-        }
-        self.tokens.len()
+        after_group(self.tokens.len(), at, |token| self.word(token))
     }
 }
 

@@ -20,12 +20,12 @@ impl Ready {
             only: passes(&request.only)?,
             ..Kept::default()
         };
+        let read = self.read_names();
         for name in &request.keep {
             let variables = self.source.module.global_variables.iter();
             let is_variable = variables
                 .filter_map(|(_, variable)| variable.name.as_ref())
                 .any(|variable| is_within(name, variable));
-            let read = self.read_names();
             if is_variable {
                 if read.iter().any(|place| is_within(place, name)) {
                     kept.read.insert(name.clone());
@@ -49,7 +49,7 @@ impl Ready {
             }
             kept.values.extend(values);
         }
-        self.directives(&mut kept)?;
+        self.directives(&read, &mut kept)?;
         Ok(kept)
     }
 
@@ -81,17 +81,9 @@ impl Ready {
     /// The values that a name stands for: by a part of their paths, a function's all that it computes.
     fn values_of(&self, name: &str) -> BTreeSet<String> {
         let wanted: Vec<&str> = name.split('.').collect();
-        let means = |path: &str| {
-            let path: Vec<&str> = path.split('.').collect();
-            let mut places = path.windows(wanted.len());
-            places.any(|place| {
-                let mut steps = place.iter().zip(&wanted);
-                steps.all(|(step, wanted)| is_called(step, wanted))
-            })
-        };
         let computed = self.computed().map(|(_, path)| path);
         computed
-            .filter(|path| means(path))
+            .filter(|path| has_part(path, &wanted))
             .map(str::to_owned)
             .collect()
     }
@@ -129,8 +121,17 @@ fn passes(names: &[String]) -> Result<BTreeSet<String>> {
     }
 }
 
+/// Whether a part of a path is called so, step by step.
+pub(super) fn has_part(path: &str, wanted: &[&str]) -> bool {
+    let path: Vec<&str> = path.split('.').collect();
+    path.windows(wanted.len()).any(|steps| {
+        let mut pairs = steps.iter().zip(wanted);
+        pairs.all(|(step, wanted)| is_called(step, wanted))
+    })
+}
+
 /// Whether a step of a path is a value of that name: what a variable holds later has a number behind it.
-pub(super) fn is_called(step: &str, name: &str) -> bool {
+fn is_called(step: &str, name: &str) -> bool {
     step.strip_prefix(name).is_some_and(|rest| {
         rest.is_empty()
             || rest

@@ -90,19 +90,12 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
         output: asked.output.clone(),
         ..request.clone()
     };
-    let stem_of = |request: &Request| {
-        let base = request.base();
-        base.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
-    let (stem, name) = (stem_of(request), format!("{}.snapshot", stem_of(&place)));
+    let (stem, name) = (request.stem(), format!("{}.snapshot", place.stem()));
     let (frozen, files) = emit::one_level(&read.source, levels, at, target, (&stem, &name))?;
     let needs = needs(&frozen);
     let spared = self::needs(&read.source).into_iter();
     let spared = spared.filter(|need| !needs.iter().any(|have| have.name == need.name));
-    let files = place.placed(files, &stem_of(&place));
+    let files = place.placed(files, &place.stem());
     request.spare(&files, &[request.shader.clone(), request.lock()])?;
     let before = at.checked_sub(1).and_then(|before| levels.get(before));
     Ok(Snapshot {

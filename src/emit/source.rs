@@ -2,7 +2,7 @@
 //! into an ordinary function. Everything else of the text stays as it is, byte for byte.
 
 use super::tidy::is_generic;
-use super::tokens::{Kind, Token, tokens, words};
+use super::tokens::{Kind, Token, after_group, tokens, words};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -156,20 +156,7 @@ impl<'a> Text<'a> {
 
     /// The token after the bracket that closes the one at `at`.
     fn after_group(&self, at: usize) -> usize {
-        let mut depth = 0usize;
-        for token in at..self.tokens.len() {
-            match self.word(token) {
-                "(" | "[" | "{" => depth += 1,
-                ")" | "]" | "}" => {
-                    depth = depth.saturating_sub(1);
-                    if depth == 0 {
-                        return token + 1;
-                    }
-                }
-                _ => {}
-            }
-        }
-        self.tokens.len()
+        after_group(self.tokens.len(), at, |token| self.word(token))
     }
 
     /// The token after the item at `at`: after its `;`, or after its body and the `;` that may follow it.

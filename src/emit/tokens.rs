@@ -37,6 +37,24 @@ impl Token {
     }
 }
 
+/// Of `count` tokens, the one after the bracket that closes the one at `at`.
+pub(crate) fn after_group<'t>(count: usize, at: usize, word: impl Fn(usize) -> &'t str) -> usize {
+    let mut depth = 0usize;
+    for token in at..count {
+        match word(token) {
+            "(" | "[" | "{" => depth += 1,
+            ")" | "]" | "}" => {
+                depth = depth.saturating_sub(1);
+                if depth == 0 {
+                    return token + 1;
+                }
+            }
+            _ => {}
+        }
+    }
+    count
+}
+
 /// White space of the WGSL specification, section 3.2.
 fn is_blank(c: char) -> bool {
     matches!(

@@ -14,6 +14,7 @@
 
 mod adapter;
 mod blend;
+mod compute;
 mod depth;
 mod entry;
 pub mod error;

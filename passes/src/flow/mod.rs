@@ -144,6 +144,14 @@ impl<'a> Flow<'a> {
         self.findings.constant[value.index()]
     }
 
+    /// Whether what is made of these parts joins two that differ and are no constants: made of one part, it says the same as
+    /// the part, less plainly.
+    pub(crate) fn joins(&self, parts: &[Value]) -> bool {
+        let mut parts = parts.iter().filter(|part| !self.is_constant(**part));
+        let first = parts.next();
+        parts.any(|part| Some(part) != first)
+    }
+
     /// Why a value must stay as it is, when it must.
     pub(crate) fn decides(&self, value: Value) -> Option<Decides> {
         self.findings.decides[value.index()]

@@ -299,21 +299,10 @@ struct Interface {
 
 impl Interface {
     fn new(program: &Program, coverage: &Coverage, targets: &[u32]) -> Self {
-        let same = |a: &Slot, b: &Slot| {
-            a.component == b.component
-                && match (&a.binding, &b.binding) {
-                    (
-                        Binding::Location { location: a, .. },
-                        Binding::Location { location: b, .. },
-                    ) => a == b,
-                    (Binding::BuiltIn(a), Binding::BuiltIn(b)) => a == b,
-                    _ => false,
-                }
-        };
         let found: Vec<Option<usize>> = program
             .inputs()
             .iter()
-            .map(|slot| coverage.slots.iter().position(|have| same(have, slot)))
+            .map(|slot| coverage.slots.iter().position(|have| have.meets(slot)))
             .collect();
         let identical = found.len() == coverage.slots.len()
             && found.iter().enumerate().all(|(i, &at)| at == Some(i));

@@ -59,6 +59,19 @@ pub struct Slot {
     pub interpolation: Option<Interpolation>,
 }
 
+impl Slot {
+    /// Whether what is handed over here arrives there: at the same component of the same location or built-in.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.component == other.component
+            && match (&self.binding, &other.binding) {
+                (Binding::Location { location: a, .. }, Binding::Location { location: b, .. }) => {
+                    a == b
+                }
+                (a, b) => a == b,
+            }
+    }
+}
+
 impl Program {
     /// Compiles the entry point at `entry` of a validated module. `probes` are expressions of its
     /// function whose values are summed up while it runs (see [`super::machine::Profile`]); one that

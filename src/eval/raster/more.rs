@@ -6,7 +6,6 @@
 use super::triangle::Triangle;
 use super::{Block, Coverage, Frame, Target, quads, vertices};
 use crate::eval::program::{Program, Slot};
-use naga::Binding;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -23,18 +22,8 @@ impl Coverage {
         fragment: &Program,
         frame: &Frame,
     ) -> Self {
-        let same = |a: &Slot, b: &Slot| {
-            a.component == b.component
-                && match (&a.binding, &b.binding) {
-                    (
-                        Binding::Location { location: a, .. },
-                        Binding::Location { location: b, .. },
-                    ) => a == b,
-                    (a, b) => a == b,
-                }
-        };
         let further = fragment.inputs().iter();
-        let further = further.filter(|slot| !self.slots.iter().any(|have| same(have, slot)));
+        let further = further.filter(|slot| !self.slots.iter().any(|have| have.meets(slot)));
         let further: Vec<Slot> = further.cloned().collect();
 
         // The triangles that fragments are of, draw by draw, and where their vertices come to be.

@@ -12,6 +12,7 @@
 //! not every device blends floats of 32 bits.
 
 use super::adapter::Gpu;
+use super::compute;
 use super::entry::{Behind, Targets};
 use super::pass::{COLOUR, COVERED, DEPTH, Drawing, Images, Pass, Views, free};
 use super::read::words_of;
@@ -22,8 +23,8 @@ use crate::eval::draw::{Blend, state_of};
 use crate::eval::raster::Frame;
 use crate::scene::{Output, Scene};
 use wgpu::{
-    BindingType, BufferBindingType, BufferUsages, CompareFunction, ShaderStages,
-    StorageTextureAccess, TextureFormat, TextureUsages, TextureViewDimension,
+    BindingType, BufferBindingType, BufferUsages, CompareFunction, StorageTextureAccess,
+    TextureFormat, TextureUsages, TextureViewDimension,
 };
 
 /// The edge of a workgroup, in fine pixels.
@@ -247,62 +248,26 @@ impl Composition {
     fn new(gpu: &Gpu) -> Self {
         let device = gpu.device();
         let module = device.create_shader_module(wgpu::include_wgsl!("blend.wgsl"));
-        let texture = BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
-            view_dimension: TextureViewDimension::D2,
-            multisampled: false,
-        };
         let written = |format: TextureFormat| BindingType::StorageTexture {
             access: StorageTextureAccess::WriteOnly,
             format,
             view_dimension: TextureViewDimension::D2,
         };
-        let of = |ty| BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
         let types = [
-            of(BufferBindingType::Uniform),
-            texture,
-            texture,
-            texture,
-            texture,
+            compute::buffer(BufferBindingType::Uniform),
+            compute::WORDS,
+            compute::WORDS,
+            compute::WORDS,
+            compute::WORDS,
             written(COLOUR),
             written(COVERED),
-            of(BufferBindingType::Storage { read_only: false }),
+            compute::buffer(BufferBindingType::Storage { read_only: false }),
         ];
-        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-            .zip(types)
-            .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: ShaderStages::COMPUTE,
-                ty,
-                count: None,
-            })
-            .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: None,
-            entries: &entries,
-        });
-        let of_all = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = |name| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: None,
-                layout: Some(&of_all),
-                module: &module,
-                entry_point: Some(name),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        };
+        let (layout, [add, finish]) =
+            compute::pipelines(device, &module, &types, ["add", "finish"]);
         Self {
-            add: pipeline("add"),
-            finish: pipeline("finish"),
+            add,
+            finish,
             layout,
         }
     }

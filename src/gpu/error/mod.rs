@@ -10,12 +10,13 @@
 //! summed by the host as f64. By then a sum is off by less than its hundred-thousandth part.
 
 use super::adapter::Gpu;
+use super::compute;
 use super::read::words_of;
 use super::render::Drawn;
 use super::resources::buffer;
 use crate::scene::{Output, ToneMapping};
 use crate::{Diagnostic, Result};
-use wgpu::{BindingType, BufferBindingType, BufferUsages, ShaderStages, TextureSampleType};
+use wgpu::{BufferBindingType, BufferUsages};
 
 /// The edge of a tile in pixels, and of a workgroup.
 pub const TILE: u32 = 8;
@@ -138,52 +139,17 @@ impl<'g> ErrorPass<'g> {
         gpu.guarded("compiling the sums of errors", || {
             let device = gpu.device();
             let module = device.create_shader_module(wgpu::include_wgsl!("error.wgsl"));
-            let texture = BindingType::Texture {
-                sample_type: TextureSampleType::Uint,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            };
-            let of = |ty| BindingType::Buffer {
-                ty,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            };
-            let storage = of(BufferBindingType::Storage { read_only: false });
-            let uniform = of(BufferBindingType::Uniform);
+            let storage = compute::buffer(BufferBindingType::Storage { read_only: false });
+            let uniform = compute::buffer(BufferBindingType::Uniform);
+            let texture = compute::WORDS;
             let types = [uniform, texture, texture, storage, storage, storage];
-            let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-                .zip(types)
-                .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-                    binding,
-                    visibility: ShaderStages::COMPUTE,
-                    ty,
-                    count: None,
-                })
-                .collect();
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: None,
-                entries: &entries,
-            });
-            let of_all = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: None,
-                bind_group_layouts: &[Some(&layout)],
-                immediate_size: 0,
-            });
-            let pipeline = |name| {
-                device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                    label: None,
-                    layout: Some(&of_all),
-                    module: &module,
-                    entry_point: Some(name),
-                    compilation_options: Default::default(),
-                    cache: None,
-                })
-            };
+            let (layout, [average, add, finish]) =
+                compute::pipelines(device, &module, &types, ["average", "add", "finish"]);
             Ok(Self {
                 gpu,
-                average: pipeline("average"),
-                add: pipeline("add"),
-                finish: pipeline("finish"),
+                average,
+                add,
+                finish,
                 layout,
             })
         })
