@@ -9,6 +9,7 @@ use crate::emit::control::{self, pipeline_constant};
 use crate::emit::{figure, writable};
 use crate::eval::image::{encode_png, to_byte};
 use crate::eval::program::{Program, Refused};
+use crate::eval::refusal;
 use crate::front::Source;
 #[cfg(feature = "gpu")]
 use crate::gpu::{Gpu, Stages};
@@ -187,7 +188,8 @@ impl<'a> Judge<'a> {
         match self {
             Self::Evaluator { original } => {
                 let base = normal_form(source)?;
-                let vertex = vertex_program(scene, &base).map_err(|refused| refused.at(source))?;
+                let vertex =
+                    vertex_program(scene, &base).map_err(|refused| refusal(&refused, source))?;
                 let other = Stand {
                     base: &base,
                     vertex: &vertex,
@@ -196,7 +198,7 @@ impl<'a> Judge<'a> {
                 let judged = evaluated([original, &other], distance, wants_pictures);
                 goes_on();
                 // The original has been compiled once; what is refused by now is the other's.
-                judged.map_err(|refused| refused.at(source))
+                judged.map_err(|refused| refusal(&refused, source))
             }
             #[cfg(feature = "gpu")]
             Self::Gpu { device, original } => {

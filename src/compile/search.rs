@@ -6,6 +6,7 @@ use crate::eval::draw::shade;
 use crate::eval::machine::MAX_ROUNDS;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::rasterize;
+use crate::eval::refusal;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report};
 use crate::scene::{Reading, Scene};
@@ -80,7 +81,8 @@ impl Read {
         // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
         let fragment = base.index(Stage::Fragment).unwrap_or(0);
-        Program::compile(base.module(), fragment, &[]).map_err(|refused| refused.at(&source))?;
+        Program::compile(base.module(), fragment, &[])
+            .map_err(|refused| refusal(&refused, &source))?;
         Ok(Self {
             request,
             source,
@@ -129,7 +131,7 @@ impl Ready {
 
     /// The vertex program: of the source, or the one that lodc supplies.
     pub(super) fn vertex(&self) -> Result<Program> {
-        vertex_program(&self.scene, &self.base).map_err(|refused| refused.at(&self.source))
+        vertex_program(&self.scene, &self.base).map_err(|refused| refusal(&refused, &self.source))
     }
 }
 
@@ -149,7 +151,7 @@ impl Ready {
     pub(super) fn ends(&self, vertex: &Program) -> Result<()> {
         let fragment = self.base.index(Stage::Fragment).unwrap_or(0);
         let fragment = Program::compile(self.base.module(), fragment, &[])
-            .map_err(|refused| refused.at(&self.source))?;
+            .map_err(|refused| refusal(&refused, &self.source))?;
         let Some(frame) = self.scene.frames(self.scene.nearest).into_iter().next() else {
             return Ok(());
         };
@@ -195,7 +197,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     };
     let kept = ready.kept(request)?;
     let found = search::find(&stand, (request.exact, &kept), progress)
-        .map_err(|refused| refused.at(&ready.source))?;
+        .map_err(|refused| refusal(&refused, &ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     let levels: Vec<EmitLevel> = found
         .levels
@@ -509,7 +511,7 @@ pub fn trajectory(request: &Request) -> Result<Vec<search::Step>> {
     };
     let kept = ready.kept(request)?;
     search::trajectory(&stand, &kept, ready.scene.farthest)
-        .map_err(|refused| refused.at(&ready.source))
+        .map_err(|refused| refusal(&refused, &ready.source))
 }
 
 /// Every candidate of a shader at the scene's middle distance, with what it is worth: for `lodc inspect`.
@@ -528,7 +530,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let distances = &ready.scene.distances;
     let distance = distances[distances.len() / 2];
     let set = SampleSet::new(&stand, distance, Samples::Search)
-        .map_err(|refused| refused.at(&ready.source))?;
+        .map_err(|refused| refusal(&refused, &ready.source))?;
     let facts = set.facts(&ready.base);
     let candidates: Vec<Candidate> = PASSES
         .iter()

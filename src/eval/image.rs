@@ -4,6 +4,7 @@
 //! same bits come out everywhere.
 
 use crate::{Diagnostic, Result};
+pub use lodc_machine::texture::Image;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -14,17 +15,6 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 /// The longest edge of an image that is read, in pixels: what WebGPU promises for textures.
 pub const MAX_EDGE: u32 = 8192;
-
-/// A decoded image, row by row from the top left.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// Width in texels.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
-    /// `width * height` texels.
-    pub texels: Vec<[f32; 4]>,
-}
 
 /// A drawn picture, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]

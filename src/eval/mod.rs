@@ -10,9 +10,9 @@
 
 pub mod draw;
 pub mod image;
-pub mod lane;
-pub mod machine;
 pub mod parameters;
-pub mod program;
 pub mod raster;
-pub mod texture;
+mod refused;
+
+pub use lodc_machine::{lane, machine, program, texture};
+pub use refused::refusal;

@@ -14,6 +14,7 @@ use crate::eval::draw::{Format, Lighting, Plane};
 use crate::eval::machine::Bindings;
 use crate::eval::program::Program;
 use crate::eval::raster::Frame;
+use crate::eval::refusal;
 use crate::front::names::{listed, whole_word, words};
 use crate::front::{Input, Source, Stages, inputs, read_text, validate};
 use crate::{Diagnostic, Result};
@@ -219,7 +220,7 @@ pub(super) fn resolve(
     }
     let (supplied, vertex) = vertex(&source)?;
     let fragment = Program::compile(&source.module, source.fragment_entry().0, &[])
-        .map_err(|refused| refused.at(&source))?;
+        .map_err(|refused| refusal(&refused, &source))?;
 
     let mut said = Said::default();
     let buffers = buffers::resolve(
@@ -702,7 +703,7 @@ fn vertex(source: &Source) -> Result<(Option<Module>, Program)> {
                 .with_note("a full-screen shader makes its triangle of `@builtin(vertex_index)`; leave the stage out, and lodc supplies one"));
         }
         let own = Program::compile(&source.module, entry, &[]);
-        return Ok((None, own.map_err(|refused| refused.at(source))?));
+        return Ok((None, own.map_err(|refused| refusal(&refused, source))?));
     }
     let read = inputs(source, source.fragment_entry().0);
     let mut members = String::new();

@@ -851,12 +851,11 @@ impl<'r> Reader<'r> {
         if self.kind.one_dimension && images.iter().any(|i| i.height != 1) {
             return Err(wrong(entry.span(), "this image is higher than one texel"));
         }
-        let at = |error: Box<Diagnostic>| {
-            error
+        let texture = Texture::new(self.kind.dimension, images).map_err(|misfit| {
+            Box::<Diagnostic>::from(misfit)
                 .with_source(toml.name, toml.text)
                 .with_label(entry.span(), "")
-        };
-        let texture = Texture::new(self.kind.dimension, images).map_err(at)?;
+        })?;
         // Integers have no means, and so no MIP levels.
         let texture = if space == Space::Integer {
             texture

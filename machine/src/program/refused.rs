@@ -1,7 +1,5 @@
 //! What the evaluator does not run, and what an author can do about each.
 
-use crate::Diagnostic;
-use crate::front::Source;
 use naga::{Span, TypeInner};
 
 /// Something the evaluator does not run (storage writes, ray queries, subgroup operations, ...).
@@ -12,7 +10,7 @@ pub struct Refused {
     /// Where, in the text that the module was parsed from.
     pub span: Span,
     /// What to write instead, as an advice.
-    instead: &'static str,
+    pub instead: &'static str,
 }
 
 impl Refused {
@@ -32,20 +30,6 @@ impl Refused {
             span: Span::UNDEFINED,
             instead: UNKNOWN,
         }
-    }
-
-    /// The same as a message at its place in the source that was compiled.
-    pub fn at(&self, source: &Source) -> Box<Diagnostic> {
-        source
-            .error(
-                format!("lodc cannot evaluate {}", self.what),
-                self.span,
-                "here",
-            )
-            .with_reason(
-                "errors are measured by running the shader on the CPU, which does not do this",
-            )
-            .with_note(self.instead)
     }
 }
 

@@ -7,7 +7,7 @@ mod quads;
 mod textures;
 
 use super::*;
-use crate::eval::program::Refused;
+use crate::program::Refused;
 
 fn module(source: &str) -> naga::Module {
     let module = match naga::front::wgsl::parse_str(source) {

@@ -2,7 +2,7 @@
 //! and expressions computed for lanes against the same ones folded.
 
 use super::*;
-use crate::eval::machine::kernels::once;
+use crate::machine::kernels::once;
 use lodc_passes::semantics::{Op, evaluate};
 
 /// A generator of numbers (xorshift).

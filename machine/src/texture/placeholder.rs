@@ -2,7 +2,7 @@
 
 use super::sample::cube_direction;
 use super::{Dimension, Level};
-use crate::scene::chance::mix;
+use crate::chance::mix;
 
 /// Texels along an edge.
 const SIZE: u32 = 64;

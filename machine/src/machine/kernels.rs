@@ -3,8 +3,8 @@
 //! A result is computed in a spare block, which then changes places with the register that it is for:
 //! so an operand's register may be the result's.
 
-use crate::eval::lane::{LANES, Words};
-use crate::eval::program::code::Register;
+use crate::lane::{LANES, Words};
+use crate::program::code::Register;
 use lodc_passes::scalar_operations;
 use lodc_passes::semantics::{Kind, Op, Real};
 

@@ -9,7 +9,7 @@
 //! - Implicit gradients are the differences of a quad's lanes 1 and 2 from lane 0, the same for all four.
 
 use super::{Comparison, Dimension, Level, Sampler, Texture, Wrap};
-use crate::eval::lane::{LANES, Mask};
+use crate::lane::{LANES, Mask};
 use lodc_passes::semantics::Real;
 
 /// One float a lane.
@@ -759,7 +759,7 @@ pub(super) fn cube_direction(face: usize, s: f32, t: f32) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eval::image::Image;
+    use crate::texture::Image;
 
     fn image(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Image {
         let texels = (0..height)

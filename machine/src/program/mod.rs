@@ -61,7 +61,7 @@ pub struct Slot {
 
 impl Slot {
     /// Whether what is handed over here arrives there: at the same component of the same location or built-in.
-    pub(crate) fn meets(&self, other: &Self) -> bool {
+    pub fn meets(&self, other: &Self) -> bool {
         self.component == other.component
             && match (&self.binding, &other.binding) {
                 (Binding::Location { location: a, .. }, Binding::Location { location: b, .. }) => {
@@ -233,8 +233,8 @@ fn leaves(module: &Module, inner: &TypeInner, visit: &mut impl FnMut(ScalarKind)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eval::lane::{LANES, Mask, Words};
-    use crate::eval::machine::{Bindings, Machine};
+    use crate::lane::{LANES, Mask, Words};
+    use crate::machine::{Bindings, Machine};
 
     /// The register of `!c` was that of a sum before, and still is in the lanes that do not ask for `c`.
     #[test]

@@ -1,7 +1,7 @@
 //! Texture operations reach the texture with the right operands.
 
 use super::*;
-use crate::eval::texture::{Dimension, Request};
+use crate::texture::{Dimension, Request};
 
 fn texture() -> Arc<Texture> {
     Arc::new(Texture::placeholder(5, Dimension::D2, 3))
@@ -26,7 +26,7 @@ const ITEMS: &str = "
     @group(0) @binding(1) var compare: sampler_comparison;
     @group(0) @binding(0) var whole: texture_2d_array<u32>;";
 
-fn coordinates() -> [crate::eval::texture::Floats; 2] {
+fn coordinates() -> [crate::texture::Floats; 2] {
     [
         std::array::from_fn(|lane| (lane as f32 * 0.01).fract()),
         std::array::from_fn(|lane| (lane / 4) as f32 * 0.003 + (lane % 4 / 2) as f32 * 0.02),
@@ -45,7 +45,7 @@ fn sampled(body: &str) -> Outcome {
     run_bound(&compile(&source), &bindings())
 }
 
-fn expect(outcome: &Outcome, want: &[crate::eval::texture::Floats; 4]) {
+fn expect(outcome: &Outcome, want: &[crate::texture::Floats; 4]) {
     for lane in 0..LANES {
         for (component, want) in want.iter().enumerate() {
             assert_eq!(outcome.float(component, lane), want[lane], "lane {lane}");
@@ -68,7 +68,7 @@ fn samples() {
 
     let bias = [1.5; LANES];
     let mut request = plain;
-    request.detail = crate::eval::texture::Detail::Implicit { bias: Some(&bias) };
+    request.detail = crate::texture::Detail::Implicit { bias: Some(&bias) };
     request.offset = [1, -2, 0];
     texture().sample(&sampler, &request, Mask::ALL, &mut want);
     expect(
@@ -78,7 +78,7 @@ fn samples() {
 
     let level: [f32; LANES] = std::array::from_fn(|lane| lane as f32 * 0.01);
     let mut request = plain;
-    request.detail = crate::eval::texture::Detail::Exact(&level);
+    request.detail = crate::texture::Detail::Exact(&level);
     texture().sample(&sampler, &request, Mask::ALL, &mut want);
     expect(
         &sampled("return textureSampleLevel(t, s, uv, i % 3, x * 0.01);"),
@@ -88,7 +88,7 @@ fn samples() {
     let (x, y) = ([0.1; LANES], [0.0; LANES]);
     let (across, down) = ([&x, &y], [&y, &level]);
     let mut request = plain;
-    request.detail = crate::eval::texture::Detail::Gradients {
+    request.detail = crate::texture::Detail::Gradients {
         ddx: &across,
         ddy: &down,
     };
@@ -103,7 +103,7 @@ fn samples() {
 
     let half = [0.5; LANES];
     let mut request = plain;
-    request.detail = crate::eval::texture::Detail::Zero;
+    request.detail = crate::texture::Detail::Zero;
     request.reference = Some(&half);
     texture().sample(&sampler, &request, Mask::ALL, &mut want);
     let one = want[0];

@@ -64,7 +64,7 @@ fn halve(texels: &[[f32; 4]], size: &mut [usize; 3], axis: usize) -> Vec<[f32; 4
 #[cfg(test)]
 mod tests {
     use super::super::{Dimension, Texture};
-    use crate::eval::image::Image;
+    use crate::texture::Image;
 
     fn grey(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Image {
         let texels = (0..height)

@@ -8,9 +8,19 @@ mod sample;
 
 pub use sample::{Detail, Floats, Integers, Request};
 
-use super::image::Image;
-use crate::{Diagnostic, Result};
 use lodc_passes::facts::TextureFacts;
+use std::fmt;
+
+/// A decoded image, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// `width * height` texels.
+    pub texels: Vec<[f32; 4]>,
+}
 
 /// The shape of a texture. One dimension is two with a height of 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,35 +117,47 @@ impl Default for Sampler {
     }
 }
 
+/// Why images do not make a texture: lower case, without a full stop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Misfit(String);
+
+impl fmt::Display for Misfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Misfit {}
+
 impl Texture {
     /// A texture of one level: an image for each layer of an array, face of a cube or slice of a volume.
     ///
     /// # Errors
     /// When there is no image, sizes differ, an image is empty, or a cube has no square faces or not six a layer.
-    pub fn new(dimension: Dimension, images: Vec<Image>) -> Result<Self> {
+    pub fn new(dimension: Dimension, images: Vec<Image>) -> Result<Self, Misfit> {
         let Some(first) = images.first() else {
-            return Err(Diagnostic::error("a texture needs at least one image"));
+            return Err(Misfit("a texture needs at least one image".to_owned()));
         };
         let (width, height, layers) = (first.width, first.height, images.len());
         if width == 0 || height == 0 {
-            return Err(Diagnostic::error("an image of a texture is empty"));
+            return Err(Misfit("an image of a texture is empty".to_owned()));
         }
         if let Some(other) = images
             .iter()
             .find(|i| (i.width, i.height) != (width, height))
         {
-            return Err(Diagnostic::error(format!(
+            return Err(Misfit(format!(
                 "the images of a texture differ in size: {width} x {height} and {} x {}",
                 other.width, other.height
             )));
         }
         if dimension == Dimension::Cube && layers % 6 != 0 {
-            return Err(Diagnostic::error(format!(
+            return Err(Misfit(format!(
                 "a cube texture needs six faces a layer, there are {layers}"
             )));
         }
         if dimension == Dimension::Cube && width != height {
-            return Err(Diagnostic::error(format!(
+            return Err(Misfit(format!(
                 "the faces of a cube texture must be square, these are {width} x {height}"
             )));
         }
@@ -182,7 +204,7 @@ impl Texture {
     }
 
     /// The texels of the finest level, to be written.
-    pub(crate) fn texels_mut(&mut self) -> &mut [[f32; 4]] {
+    pub fn texels_mut(&mut self) -> &mut [[f32; 4]] {
         &mut self.levels[0].texels
     }
 

@@ -149,7 +149,7 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
-    use crate::eval::program::Program;
+    use crate::program::Program;
     use naga::Expression;
 
     /// Which components of each named value are parts of the opacity, and the bindings of textures whose alpha is.

@@ -2,9 +2,9 @@
 
 use super::Machine;
 use super::kernels::Registers;
-use crate::eval::lane::{LANES, Lane, Mask};
-use crate::eval::program::code::{Detail, Question, Register, Sample, TexelLoad};
-use crate::eval::texture::{self, Floats, Integers, Request};
+use crate::lane::{LANES, Lane, Mask};
+use crate::program::code::{Detail, Question, Register, Sample, TexelLoad};
+use crate::texture::{self, Floats, Integers, Request};
 
 /// Blocks for operands that are uniform or not `f32`, and for results.
 #[derive(Debug)]

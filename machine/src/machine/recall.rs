@@ -3,8 +3,8 @@
 //! Variants of one shader read the same textures at the same places, mostly. A read is found again by all that it is a
 //! function of, bit by bit, so that a program gives the same bits with it as without.
 
-use crate::eval::lane::{LANES, Mask};
-use crate::eval::texture::{Detail, Floats, Request, Sampler, Texture};
+use crate::lane::{LANES, Mask};
+use crate::texture::{Detail, Floats, Request, Sampler, Texture};
 use std::sync::{PoisonError, RwLock};
 
 /// The most reads that are kept of a block; later ones then take the places of the oldest.
@@ -160,7 +160,7 @@ impl Recall {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eval::texture::Dimension;
+    use crate::texture::Dimension;
 
     #[test]
     fn reads_are_told_apart_by_all_that_they_depend_on() {

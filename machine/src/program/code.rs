@@ -15,32 +15,32 @@ pub struct Register(u32);
 impl Register {
     const UNIFORM: u32 = 1 << 31;
     /// Stands for an operand that is not there.
-    pub(in crate::eval) const NONE: Self = Self(u32::MAX);
+    pub(crate) const NONE: Self = Self(u32::MAX);
 
-    pub(in crate::eval) fn varying(index: u32) -> Self {
+    pub(crate) fn varying(index: u32) -> Self {
         Self(index)
     }
 
-    pub(in crate::eval) fn uniform(index: u32) -> Self {
+    pub(crate) fn uniform(index: u32) -> Self {
         Self(index | Self::UNIFORM)
     }
 
     /// Whether it is the same for all lanes.
     #[inline(always)]
-    pub(in crate::eval) fn is_uniform(self) -> bool {
+    pub(crate) fn is_uniform(self) -> bool {
         self.0 & Self::UNIFORM != 0
     }
 
     /// Its place in its file.
     #[inline(always)]
-    pub(in crate::eval) fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         (self.0 & !Self::UNIFORM) as usize
     }
 }
 
-/// How the MIP level of a sample is chosen; see [`crate::eval::texture::Detail`].
+/// How the MIP level of a sample is chosen; see [`crate::texture::Detail`].
 #[derive(Clone, Debug)]
-pub(in crate::eval) enum Detail<V> {
+pub(crate) enum Detail<V> {
     Implicit(Option<V>),
     Gradients(Vec<V>, Vec<V>),
     Exact(V),
@@ -49,33 +49,33 @@ pub(in crate::eval) enum Detail<V> {
 
 /// A texture sample.
 #[derive(Clone, Debug)]
-pub(in crate::eval) struct Sample<V> {
-    pub(in crate::eval) texture: u32,
-    pub(in crate::eval) sampler: u32,
-    pub(in crate::eval) coordinates: Vec<V>,
-    pub(in crate::eval) layer: Option<V>,
-    pub(in crate::eval) offset: [i32; 3],
-    pub(in crate::eval) detail: Detail<V>,
-    pub(in crate::eval) gather: Option<usize>,
-    pub(in crate::eval) reference: Option<V>,
-    pub(in crate::eval) clamp_to_edge: bool,
+pub(crate) struct Sample<V> {
+    pub(crate) texture: u32,
+    pub(crate) sampler: u32,
+    pub(crate) coordinates: Vec<V>,
+    pub(crate) layer: Option<V>,
+    pub(crate) offset: [i32; 3],
+    pub(crate) detail: Detail<V>,
+    pub(crate) gather: Option<usize>,
+    pub(crate) reference: Option<V>,
+    pub(crate) clamp_to_edge: bool,
     /// What takes the four components; nothing where nobody asks.
-    pub(in crate::eval) results: [Option<V>; 4],
+    pub(crate) results: [Option<V>; 4],
 }
 
 /// A texel load.
 #[derive(Clone, Debug)]
-pub(in crate::eval) struct TexelLoad<V> {
-    pub(in crate::eval) texture: u32,
-    pub(in crate::eval) coordinates: Vec<V>,
-    pub(in crate::eval) layer: Option<V>,
-    pub(in crate::eval) level: Option<V>,
-    pub(in crate::eval) results: [Option<V>; 4],
+pub(crate) struct TexelLoad<V> {
+    pub(crate) texture: u32,
+    pub(crate) coordinates: Vec<V>,
+    pub(crate) layer: Option<V>,
+    pub(crate) level: Option<V>,
+    pub(crate) results: [Option<V>; 4],
 }
 
 /// What is asked of a texture besides its texels.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::eval) enum Question {
+pub(crate) enum Question {
     /// Width, height and depth of a level.
     Size,
     /// How many levels there are.
@@ -86,7 +86,7 @@ pub(in crate::eval) enum Question {
 
 impl<V: Copy> Sample<V> {
     /// Calls `visit` with each operand.
-    pub(in crate::eval) fn operands(&self, mut visit: impl FnMut(V)) {
+    pub(crate) fn operands(&self, mut visit: impl FnMut(V)) {
         self.coordinates.iter().copied().for_each(&mut visit);
         self.layer.iter().copied().for_each(&mut visit);
         self.reference.iter().copied().for_each(&mut visit);
@@ -99,7 +99,7 @@ impl<V: Copy> Sample<V> {
     }
 
     /// The same with other names for its values.
-    pub(in crate::eval) fn map<U>(&self, to: impl Fn(V) -> U) -> Sample<U> {
+    pub(crate) fn map<U>(&self, to: impl Fn(V) -> U) -> Sample<U> {
         let list = |values: &[V]| values.iter().map(|&v| to(v)).collect();
         Sample {
             texture: self.texture,
@@ -123,14 +123,14 @@ impl<V: Copy> Sample<V> {
 
 impl<V: Copy> TexelLoad<V> {
     /// Calls `visit` with each operand.
-    pub(in crate::eval) fn operands(&self, mut visit: impl FnMut(V)) {
+    pub(crate) fn operands(&self, mut visit: impl FnMut(V)) {
         self.coordinates.iter().copied().for_each(&mut visit);
         self.layer.iter().copied().for_each(&mut visit);
         self.level.iter().copied().for_each(&mut visit);
     }
 
     /// The same with other names for its values.
-    pub(in crate::eval) fn map<U>(&self, to: impl Fn(V) -> U) -> TexelLoad<U> {
+    pub(crate) fn map<U>(&self, to: impl Fn(V) -> U) -> TexelLoad<U> {
         TexelLoad {
             texture: self.texture,
             coordinates: self.coordinates.iter().map(|&v| to(v)).collect(),
@@ -143,7 +143,7 @@ impl<V: Copy> TexelLoad<V> {
 
 /// One instruction.
 #[derive(Clone, Debug)]
-pub(in crate::eval) enum Instruction {
+pub(crate) enum Instruction {
     /// A scalar operation.
     Op {
         op: Op,
@@ -218,16 +218,16 @@ pub(in crate::eval) enum Instruction {
 
 /// A case of a switch.
 #[derive(Clone, Debug)]
-pub(in crate::eval) struct Case {
-    pub(in crate::eval) value: Option<u32>,
-    pub(in crate::eval) body: Vec<Step>,
-    pub(in crate::eval) fall_through: bool,
+pub(crate) struct Case {
+    pub(crate) value: Option<u32>,
+    pub(crate) body: Vec<Step>,
+    pub(crate) fall_through: bool,
 }
 
 /// A step of the program: straight code, or control flow. Lanes that exit wait at the end of what has
 /// the label.
 #[derive(Clone, Debug)]
-pub(in crate::eval) enum Step {
+pub(crate) enum Step {
     Run(Range<usize>),
     Kill,
     If {
@@ -256,17 +256,17 @@ pub(in crate::eval) enum Step {
 
 /// Everything that a machine runs.
 #[derive(Debug, Default)]
-pub(in crate::eval) struct Code {
+pub(crate) struct Code {
     /// Registers of varying floats, varying words, uniform floats and uniform words.
-    pub(in crate::eval) registers: [u32; 4],
+    pub(crate) registers: [u32; 4],
     /// The constants that uniform registers start with.
-    pub(in crate::eval) constants: Vec<(Kind, Register, u32)>,
+    pub(crate) constants: Vec<(Kind, Register, u32)>,
     /// Instructions that run once for a draw, on uniform registers.
-    pub(in crate::eval) prologue: Vec<Instruction>,
-    pub(in crate::eval) instructions: Vec<Instruction>,
-    pub(in crate::eval) steps: Vec<Step>,
-    pub(in crate::eval) labels: u32,
+    pub(crate) prologue: Vec<Instruction>,
+    pub(crate) instructions: Vec<Instruction>,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) labels: u32,
     /// Where each input goes; nothing when it is not read.
-    pub(in crate::eval) inputs: Vec<Option<(Kind, Register)>>,
-    pub(in crate::eval) outputs: Vec<(ScalarKind, Register)>,
+    pub(crate) inputs: Vec<Option<(Kind, Register)>>,
+    pub(crate) outputs: Vec<(ScalarKind, Register)>,
 }
