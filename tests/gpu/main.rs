@@ -81,10 +81,8 @@ fn materials_are_drawn_alike(interface: &str) {
     let mut wrong = Vec::new();
     for path in fixtures::small_materials(&scratch(interface), 64, &[]) {
         let (source, scene) = read(&path);
-        let name = format!(
-            "{interface} {}",
-            path.file_stem().unwrap_or_default().display()
-        );
+        let material = path.file_stem().unwrap_or_default().display().to_string();
+        let name = format!("{interface} {material}");
         let mut renderer = Renderer::new(&gpu);
         let written = Stages::of_source(&source, &scene).expect("it has both stages");
         let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
@@ -106,7 +104,7 @@ fn materials_are_drawn_alike(interface: &str) {
                 rounded.add(&scene, &drawn, &truth);
             }
         }
-        wrong.extend(filtered.judge(&name, FILTERED));
+        wrong.extend(filtered.judge(&name, FILTERED.of(&material)));
         wrong.extend(rounded.judge(&format!("{name}, even textures"), ROUNDED));
         wrong.extend(forms.judge(&format!("{name}, its normal form"), ROUNDED));
     }

@@ -20,6 +20,7 @@ const COARSE: (&str, Tolerance) = (
     Tolerance {
         mean: FILTERED.mean,
         most: 0.15,
+        jumps: true,
     },
 );
 
@@ -57,7 +58,7 @@ fn shaders_are_drawn_alike(interface: &str) {
         forms.add(&scene, &normal, &written);
         let tolerance = match COARSE {
             (coarse, tolerance) if coarse == name => tolerance,
-            _ => FILTERED,
+            _ => FILTERED.of(&name),
         };
         let name = format!("{interface} {name}");
         wrong.extend(renderers.judge(&name, tolerance));

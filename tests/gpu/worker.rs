@@ -170,8 +170,11 @@ fn a_picture_that_no_memory_is_left_for_is_an_error_and_the_next_one_is_drawn() 
             ..WANTED
         });
         let failed = large.expect_err("there is no room for it");
-        // Some drivers say so, and some are lost, or crash.
-        let said = |error: &str| error.contains("memory") || error.contains("lost");
+        // Some drivers say so, some are lost or crash, and some never end.
+        let said = |error: &str| {
+            let words = ["memory", "lost", "cannot be read"];
+            words.iter().any(|word| error.contains(word))
+        };
         let typed = match &failed {
             Failure::Refused(error) => said(&error.message),
             failed => matches!(failed, Failure::Crashed { .. }),
