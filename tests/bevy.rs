@@ -9,13 +9,14 @@
 mod pictures;
 
 use lodc::compile::{self, Request};
-use lodc::emit::{Output, emit, write_atomically};
+use lodc::emit::{EmitLevel, Form, Output, emit, write_atomically};
 use lodc::eval::draw::shade;
 use lodc::eval::program::Program;
 use lodc::eval::raster::rasterize;
 use lodc::front::{Definition, Modules, Source, Stages, Value};
 use lodc::scene::{Reading, Scene};
-use lodc_passes::{Shader, Stage};
+use lodc_passes::vertex_motion::VertexMotion;
+use lodc_passes::{Facts, Pass, Shader, Stage};
 use naga::{Module, ShaderStage, Statement};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -261,6 +262,65 @@ fn there_are_levels_and_the_lock_makes_them_again() {
     let (files, warnings) = compile::locked(&again).unwrap_or_else(|error| panic!("{error}"));
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(files[0].1, text.as_bytes());
+}
+
+#[test]
+fn a_level_with_values_at_the_vertices_is_drawn_as_its_variant() {
+    let Some(folders) = folders() else { return };
+    let file = small_scene("moved", 32);
+    let source = composed(&folders, &file, &[]);
+    let base = compile::normal_form(&source).unwrap_or_else(|error| panic!("{error}"));
+    let scene = Scene::read(&source, Some(&file)).unwrap_or_else(|error| panic!("{error}"));
+    // Some values that can be moved one after another.
+    let mut shader = base.clone();
+    let mut moved = 0;
+    while moved < 4 {
+        let candidates = VertexMotion.candidates(&shader, &Facts::default());
+        let Some(candidate) = candidates.get(candidates.len() * (moved + 1) / 5) else {
+            break;
+        };
+        shader = VertexMotion.apply(&shader, candidate);
+        moved += 1;
+    }
+    assert_eq!(moved, 4);
+    let vertex = source.vertex.as_deref().expect("the mesh stage was linked");
+    let variant = programs(shader.module(), vertex, &source.fragment);
+    let level = EmitLevel {
+        autolod: 1.0,
+        shader,
+        distance: scene.distances[1],
+        error: 0.0,
+        cost: 1.0,
+        says: "values per vertex".into(),
+    };
+    for form in [Form::Override, Form::Uniform, Form::Files] {
+        let output = Output {
+            form,
+            ..Output::default()
+        };
+        let files = emit(&source, &base, std::slice::from_ref(&level), output);
+        let files = files.unwrap_or_else(|error| panic!("{error}"));
+        let (_, text) = files.last().expect("there is one");
+        let text = String::from_utf8(text.clone()).expect("it is text");
+        let emitted = Source::parse("pbr.lod.wgsl", text).unwrap_or_else(|e| panic!("{e}"));
+        let constants = [("autoLOD".to_owned(), 1.0)].into_iter().collect();
+        let module = match form {
+            Form::Uniform => continue,
+            Form::Files => std::borrow::Cow::Borrowed(&emitted.module),
+            Form::Override => {
+                naga::back::pipeline_constants::process_overrides(
+                    &emitted.module,
+                    &emitted.info,
+                    None,
+                    &constants,
+                )
+                .unwrap_or_else(|error| panic!("{error}"))
+                .0
+            }
+        };
+        let emitted = programs(&module, vertex, &source.fragment);
+        same_pictures(&scene, scene.distances[1], &emitted, &variant);
+    }
 }
 
 #[cfg(feature = "gpu")]

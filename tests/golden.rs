@@ -26,7 +26,7 @@ use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
 use lodc_passes::facts::{Facts, ValueFacts};
-use lodc_passes::{Pass, Shader, ValueId, all_passes};
+use lodc_passes::{Pass, Shader, Stage, ValueId, all_passes, specialize};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -67,8 +67,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
     let all = ["vertex-motion", "to-parameter"].contains(&pass.name());
-    let stages = |variant: &Shader| stages((&source, &shader), variant, all);
-    let before = stages(&shader);
+    let stages = |variant: &Shader, all| stages((&source, &shader), variant, all);
     let mut golden = String::new();
     let mut offered = 0;
     for considered in pass.consider(&shader, &facts) {
@@ -84,7 +83,9 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
             Ok(()),
             "{name}: {candidate}"
         );
-        let after = stages(&pass.apply(&shader, &candidate));
+        let all = all || specialize::stage(&shader, &candidate) == Some(Stage::Vertex);
+        let before = stages(&shader, all);
+        let after = stages(&pass.apply(&shader, &candidate), all);
         assert_ne!(before, after, "{name}: {candidate} changes nothing");
         golden.push_str(&fixtures::whole_diff(&before, &after));
         golden.push('\n');

@@ -8,7 +8,7 @@ mod synthetic;
 
 use lodc::front::Source;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
-use lodc_passes::{Facts, Pass, Shader, Stage, all_passes};
+use lodc_passes::{Facts, Pass, Shader, Stage, all_passes, specialize};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;
@@ -289,6 +289,13 @@ fn any_candidate_can_be_asked_of_any_shader() {
 /// Whether a value that one of two edits moves is the same with the other edit made before: what has been moved is not
 /// changed any more.
 fn independent(edits: [&Candidate; 2], alone: [&Shader; 2], one: &Shader, other: &Shader) -> bool {
+    // Into a branch goes what nothing else needs at the time: these are made first, in their order.
+    if edits
+        .iter()
+        .any(|edit| specialize::branched(edit).is_some())
+    {
+        return false;
+    }
     let of_vertices = |shader: &Shader| shader.stage_fingerprint(Stage::Vertex);
     match edits.map(|edit| edit.pass == "vertex-motion") {
         [true, false] => of_vertices(alone[0]) == of_vertices(other),

@@ -37,6 +37,23 @@ pub enum New {
     Words(Vec<u32>),
 }
 
+/// One side of a branch that leaves a value.
+pub(crate) struct Side {
+    /// The old values that are computed there and nowhere else from now on, in order.
+    pub(crate) computed: Vec<Handle<Expression>>,
+    /// What it leaves, an old value or an added one.
+    pub(crate) left: Handle<Expression>,
+}
+
+/// A branch that a value is left by.
+struct Branch {
+    value: Handle<Expression>,
+    condition: Handle<Expression>,
+    /// Where that is kept.
+    pointer: Handle<Expression>,
+    sides: [Side; 2],
+}
+
 /// A change of one function, being described.
 pub struct Edit<'a> {
     shader: &'a Shader,
@@ -51,6 +68,7 @@ pub struct Edit<'a> {
     parameters: Vec<(String, Handle<Type>, Handle<Expression>)>,
     /// What is done before it returns.
     before_return: Block,
+    branches: Vec<Branch>,
     /// The old values, and behind them those that were added.
     expressions: Arena<Expression>,
     /// The paths of the added values.
@@ -76,6 +94,7 @@ impl<'a> Edit<'a> {
             outputs: Vec::new(),
             parameters: Vec::new(),
             before_return: Block::new(),
+            branches: Vec::new(),
             expressions: function.expressions.clone(),
             added: Vec::new(),
             replaced: BTreeMap::new(),
@@ -140,6 +159,48 @@ impl<'a> Edit<'a> {
         self.before_return.append(&mut statements);
     }
 
+    /// From now on an old value, a scalar or a vector, is what a branch leaves: the first side where the condition holds, the
+    /// second where it does not. What the sides compute has been computed in the value's own block, and has no users but
+    /// on its side. Where the second computes nothing it is what the value is unless the condition holds.
+    pub(crate) fn branch(
+        &mut self,
+        value: Handle<Expression>,
+        condition: Handle<Expression>,
+        sides: [Side; 2],
+    ) {
+        let id = self.shader.id(self.stage, value);
+        let path = format!("{}.left", id.path());
+        // The variable is called as the value was, or by the end of its path.
+        let names = &self.function.named_expressions;
+        let name = match names.contains_key(&value) {
+            true => self.function.to_mut().named_expressions.swap_remove(&value),
+            false => {
+                let mut parts: Vec<&str> = id.path().rsplit('.').take(2).collect();
+                parts.reverse();
+                Some(parts.join("_"))
+            }
+        };
+        let ty = match *self.shader.type_of(self.stage, value) {
+            TypeInner::Scalar(scalar) => TypeInner::Scalar(scalar),
+            TypeInner::Vector { size, scalar } => TypeInner::Vector { size, scalar },
+            ref other => panic!("{}: a branch cannot leave {other:?}", id.path()),
+        };
+        let ty = self.ty(ty);
+        let kept = self.add_local(LocalVariable {
+            name,
+            ty,
+            init: None,
+        });
+        let pointer = self.add(path, Expression::LocalVariable(kept));
+        self.expressions[value] = Expression::Load { pointer };
+        self.branches.push(Branch {
+            value,
+            condition,
+            pointer,
+            sides,
+        });
+    }
+
     /// The handle of a type of the module, which is added when it is not there.
     pub fn ty(&mut self, inner: TypeInner) -> Handle<Type> {
         let ty = Type { name: None, inner };
@@ -173,8 +234,12 @@ impl<'a> Edit<'a> {
         }
     }
 
-    /// A constant of the type of `like`.
-    fn constant(&mut self, like: Handle<Expression>, words: &[u32]) -> Handle<Expression> {
+    /// A constant of the type of `like`, of these bits of each component.
+    pub(crate) fn constant(
+        &mut self,
+        like: Handle<Expression>,
+        words: &[u32],
+    ) -> Handle<Expression> {
         let path = format!("{}.constant", self.shader.id(self.stage, like).path());
         let inner = self.shader.type_of(self.stage, like);
         let constant = Shape::of(inner).map(|shape| Constant {
@@ -282,6 +347,10 @@ impl<'a> Edit<'a> {
                     );
                 }
             }
+        }
+        for branch in &self.branches {
+            let put = branch.put_into(body.to_mut());
+            assert!(put, "what a branch leaves is computed in the body");
         }
         if self.stage == Stage::Parameter {
             self.change_stored(body.to_mut());
@@ -488,6 +557,70 @@ impl<'a> Edit<'a> {
     }
 }
 
+impl Branch {
+    /// Puts it before the value, in the block that computes that. Returns whether the value was found.
+    fn put_into(&self, block: &mut Block) -> bool {
+        let computes = |statement: &Statement| match statement {
+            Statement::Emit(range) => range.clone().any(|value| value == self.value),
+            _ => false,
+        };
+        if !block.iter().any(computes) {
+            return block.iter_mut().any(|statement| {
+                let mut inner = operands::blocks_mut(statement);
+                inner.any(|block| self.put_into(block))
+            });
+        }
+        let moves = |value| self.sides.iter().any(|side| side.computed.contains(&value));
+        for (statement, span) in std::mem::take(block).span_into_iter() {
+            let Statement::Emit(range) = statement else {
+                block.push(statement, span);
+                continue;
+            };
+            for value in range.filter(|value| !moves(*value)) {
+                if value == self.value {
+                    self.put(block);
+                }
+                block.push(emit(value), span);
+            }
+        }
+        true
+    }
+
+    fn put(&self, block: &mut Block) {
+        let [mut accept, mut reject] = [0, 1].map(|at| {
+            let side = &self.sides[at];
+            let mut inner: Block = side
+                .computed
+                .iter()
+                .map(|value| emit(*value))
+                .collect::<Vec<_>>()
+                .into();
+            inner.push(
+                Statement::Store {
+                    pointer: self.pointer,
+                    value: side.left,
+                },
+                Span::UNDEFINED,
+            );
+            inner
+        });
+        if self.sides[1].computed.is_empty() {
+            block.append(&mut reject);
+        }
+        let branch = Statement::If {
+            condition: self.condition,
+            accept: std::mem::take(&mut accept),
+            reject,
+        };
+        block.push(branch, Span::UNDEFINED);
+    }
+}
+
+/// A statement that computes one value.
+pub(crate) fn emit(value: Handle<Expression>) -> Statement {
+    Statement::Emit(naga::Range::new_from_bounds(value, value))
+}
+
 /// Where a new value comes from.
 #[derive(Clone, Copy)]
 enum Source {
@@ -522,16 +655,7 @@ fn nth<'b>(block: &'b mut Block, number: &mut usize) -> Option<&'b mut Statement
             return Some(statement);
         }
         *number -= 1;
-        let inner: Vec<&mut Block> = match statement {
-            Statement::Block(inner) => vec![inner],
-            Statement::If { accept, reject, .. } => vec![accept, reject],
-            Statement::Loop {
-                body, continuing, ..
-            } => vec![body, continuing],
-            Statement::Switch { cases, .. } => cases.iter_mut().map(|c| &mut c.body).collect(),
-            _ => Vec::new(),
-        };
-        for inner in inner {
+        for inner in operands::blocks_mut(statement) {
             if let Some(found) = nth(inner, number) {
                 return Some(found);
             }

@@ -4,6 +4,7 @@
 //! first locations that are free; what no fragment reads any more goes, with what computed it.
 
 use crate::edit::Edit;
+use crate::operands::User;
 use crate::shader::{Shader, Stage};
 use naga::{
     Binding, BuiltIn, Expression, Function, FunctionResult, Handle, Interpolation, Module, Span,
@@ -252,6 +253,242 @@ fn locations(shader: &Shader) -> BTreeSet<u32> {
     let outputs = returned(shader);
     taken.extend(outputs.iter().filter_map(|o| location(o.binding.as_ref())));
     taken
+}
+
+/// A shader as it stands alone, with its own stages and no others: the vertex stage returns what is built in and what the
+/// fragment stage reads, with what computes that, and each stage takes what it reads. Locations stay what they are.
+pub(crate) fn alone(shader: &Shader) -> Shader {
+    let Some(fragment) = shader.index(Stage::Fragment) else {
+        return shader.clone();
+    };
+    let mut module = shader.module.clone();
+    let mut ids = shader.ids.clone();
+    let read = inputs_read(&module, fragment);
+    let mut handed = None;
+    if let Some(vertex) = shader.index(Stage::Vertex) {
+        let locations = locations_read(&module, fragment, &read);
+        handed = return_only(&mut module, vertex, &locations);
+        let shader = Shader::changed(module, ids, shader.authors);
+        let shader = match handed {
+            // What computed the others goes.
+            Some(_) => Edit::new(&shader, Stage::Vertex).finish(),
+            None => shader,
+        };
+        (module, ids) = (shader.module, shader.ids);
+        let read = inputs_read(&module, vertex);
+        take_only(&mut module, vertex, &read, None);
+    }
+    take_only(&mut module, fragment, &read, handed);
+    Shader::changed(module, ids, shader.authors)
+}
+
+/// What a stage reads of one of its arguments.
+enum Read {
+    /// It, all of it or none.
+    Whole(bool),
+    /// These members of a structure.
+    Members(BTreeSet<u32>),
+}
+
+/// What an entry point reads of each argument.
+fn inputs_read(module: &Module, entry: usize) -> Vec<Read> {
+    let function = &module.entry_points[entry].function;
+    let arguments = function.arguments.iter();
+    let mut read: Vec<Read> = arguments
+        .map(
+            |argument| match (&argument.binding, &module.types[argument.ty].inner) {
+                (None, TypeInner::Struct { .. }) => Read::Members(BTreeSet::new()),
+                _ => Read::Whole(false),
+            },
+        )
+        .collect();
+    let users = crate::operands::users(function);
+    for (value, expression) in function.expressions.iter() {
+        let Expression::FunctionArgument(at) = *expression else {
+            continue;
+        };
+        let read = &mut read[at as usize];
+        let mut members = users[value.index()].iter().map(|user| match *user {
+            User::Value(user) => match function.expressions[user] {
+                Expression::AccessIndex { index, .. } => Some(index),
+                _ => None,
+            },
+            User::Statement(_) => None,
+        });
+        match read {
+            Read::Members(found) if !users[value.index()].is_empty() => {
+                match members.by_ref().collect::<Option<Vec<u32>>>() {
+                    Some(members) => found.extend(members),
+                    None => *read = Read::Whole(true),
+                }
+            }
+            _ => *read = Read::Whole(true),
+        }
+    }
+    read
+}
+
+/// The locations of what an entry point reads.
+fn locations_read(module: &Module, entry: usize, read: &[Read]) -> BTreeSet<u32> {
+    let arguments = &module.entry_points[entry].function.arguments;
+    let mut locations = BTreeSet::new();
+    for (argument, read) in arguments.iter().zip(read) {
+        match (read, &module.types[argument.ty].inner) {
+            (Read::Whole(false), _) => {}
+            (_, TypeInner::Struct { members, .. }) => {
+                let members = members.iter().enumerate().filter(|(at, _)| match read {
+                    Read::Members(read) => read.contains(&(*at as u32)),
+                    Read::Whole(_) => true,
+                });
+                locations.extend(members.filter_map(|(_, m)| location(m.binding.as_ref())));
+            }
+            _ => locations.extend(location(argument.binding.as_ref())),
+        }
+    }
+    locations
+}
+
+/// Has an entry point return what is built in and what goes to these locations. Returns the structure of that; nothing where it is
+/// all that was returned, or where what is returned is not known member by member.
+fn return_only(
+    module: &mut Module,
+    entry: usize,
+    locations: &BTreeSet<u32>,
+) -> Option<Handle<Type>> {
+    let function = &module.entry_points[entry].function;
+    let before = function.result.as_ref()?.ty;
+    let Some(Statement::Return { value: Some(value) }) = function.body.last() else {
+        return None;
+    };
+    let value = *value;
+    let Type {
+        name,
+        inner: TypeInner::Struct { members, .. },
+    } = module.types[before].clone()
+    else {
+        return None;
+    };
+    let Expression::Compose { components, .. } = &function.expressions[value] else {
+        return None;
+    };
+    if crate::operands::users(function)[value.index()].len() > 1 {
+        return None;
+    }
+    let is_left = |member: &StructMember| {
+        location(member.binding.as_ref()).is_none_or(|location| locations.contains(&location))
+    };
+    let (left, components): (Vec<_>, Vec<_>) = members
+        .iter()
+        .zip(components)
+        .filter(|(member, _)| is_left(member))
+        .map(|(member, component)| (member.clone(), *component))
+        .unzip();
+    if left.len() == members.len() || left.is_empty() {
+        return None;
+    }
+    let ty = structure(module, name.as_deref(), left);
+    // One that had been made for the level is nobody's any more, and its name is free.
+    if let Some(Type {
+        name: Some(taken),
+        inner,
+    }) = module.types.get_handle(before).ok().cloned()
+        && taken.ends_with(SUFFIX)
+    {
+        let name = Some(format!("{taken}Before"));
+        module.types.replace(before, Type { name, inner });
+    }
+    let function = &mut module.entry_points[entry].function;
+    function.result = Some(FunctionResult { ty, binding: None });
+    function.expressions[value] = Expression::Compose { ty, components };
+    Some(ty)
+}
+
+/// Takes away the arguments of an entry point, and the locations of structures among them, that it does not read. Where what is left
+/// of a structure is what is handed over, it is that one.
+fn take_only(module: &mut Module, entry: usize, read: &[Read], handed: Option<Handle<Type>>) {
+    let mut function = std::mem::take(&mut module.entry_points[entry].function);
+    // From an old argument to the new one, and of each old one from an old member to the new one.
+    let mut arguments: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut members_of: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
+    let mut left = Vec::new();
+    for ((old, mut argument), read) in (0..).zip(function.arguments).zip(read) {
+        match read {
+            Read::Whole(true) => {}
+            Read::Whole(false) => continue,
+            Read::Members(read) if read.is_empty() => continue,
+            Read::Members(read) => {
+                let Type {
+                    name,
+                    inner: TypeInner::Struct { members, .. },
+                } = module.types[argument.ty].clone()
+                else {
+                    unreachable!("members are a structure's");
+                };
+                let is_kept = |(at, member): &(u32, &StructMember)| {
+                    read.contains(at) || location(member.binding.as_ref()).is_none()
+                };
+                let (kept, left): (Vec<u32>, Vec<StructMember>) = (0..)
+                    .zip(&members)
+                    .filter(is_kept)
+                    .map(|(at, member)| (at, member.clone()))
+                    .unzip();
+                if left.len() < members.len() {
+                    argument.ty = taken(module, name.as_deref(), left, handed);
+                    members_of.insert(old, kept.into_iter().zip(0..).collect());
+                }
+            }
+        }
+        arguments.insert(old, left.len() as u32);
+        left.push(argument);
+    }
+    function.arguments = left;
+    let inputs: BTreeMap<Handle<Expression>, u32> = function
+        .expressions
+        .iter()
+        .filter_map(|(value, expression)| match *expression {
+            Expression::FunctionArgument(at) => Some((value, at)),
+            _ => None,
+        })
+        .collect();
+    for (_, expression) in function.expressions.iter_mut() {
+        match expression {
+            Expression::FunctionArgument(at) => *at = arguments[at],
+            Expression::AccessIndex { base, index } => {
+                let members = inputs
+                    .get(base)
+                    .and_then(|argument| members_of.get(argument));
+                if let Some(members) = members {
+                    *index = members[index];
+                }
+            }
+            _ => {}
+        }
+    }
+    module.entry_points[entry].function = function;
+}
+
+/// The structure of what is left of one that a stage takes: the one that is handed over, where that has the same members.
+fn taken(
+    module: &mut Module,
+    name: Option<&str>,
+    left: Vec<StructMember>,
+    handed: Option<Handle<Type>>,
+) -> Handle<Type> {
+    let is_alike = |one: &StructMember, other: &StructMember| {
+        (&one.name, one.ty, &one.binding) == (&other.name, other.ty, &other.binding)
+    };
+    if let Some(handed) = handed
+        && let TypeInner::Struct { members, .. } = &module.types[handed].inner
+        && members.len() == left.len()
+        && members
+            .iter()
+            .zip(&left)
+            .all(|(one, other)| is_alike(one, other))
+    {
+        return handed;
+    }
+    let name = format!("{}Read", name.unwrap_or("Inputs"));
+    structure(module, Some(&name), left)
 }
 
 /// Brings what was added to the interface in order: without what no fragment reads, by name, at the first free locations.

@@ -378,6 +378,21 @@ pub fn blocks(statement: &Statement) -> impl Iterator<Item = &Block> {
     two.into_iter().flatten().chain(cases)
 }
 
+/// The same, to be changed.
+pub fn blocks_mut(statement: &mut Statement) -> impl Iterator<Item = &mut Block> {
+    let (two, cases): ([Option<&mut Block>; 2], &mut [SwitchCase]) = match statement {
+        Statement::Block(block) => ([Some(block), None], &mut []),
+        Statement::If { accept, reject, .. } => ([Some(accept), Some(reject)], &mut []),
+        Statement::Loop {
+            body, continuing, ..
+        } => ([Some(body), Some(continuing)], &mut []),
+        Statement::Switch { cases, .. } => ([None, None], cases),
+        _ => ([None, None], &mut []),
+    };
+    let cases = cases.iter_mut().map(|case| &mut case.body);
+    two.into_iter().flatten().chain(cases)
+}
+
 /// Calls `visit` for each statement of a block and of the blocks in it, a statement before its blocks.
 pub fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Statement)) {
     for statement in block {

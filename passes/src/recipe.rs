@@ -142,6 +142,11 @@ pub trait Pass: Sync {
     fn is_exact(&self) -> bool {
         false
     }
+    /// Whether a change is made before a search, as it costs no error and saves work: all changes of a pass of the exact tier, and
+    /// those of others that are sure to.
+    fn is_free(&self, _candidate: &Candidate) -> bool {
+        self.is_exact()
+    }
     /// Every change that this pass thinks of, in a fixed order; those that it declines with the reason.
     fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered>;
     /// Every change that this pass could make, in a fixed order.

@@ -295,6 +295,14 @@ impl Shader {
         interface::most_locations(self)
     }
 
+    /// The shader as it stands alone, with no stages but its own: the vertex stage returns nothing that the fragment stage
+    /// does not read, with nothing that computes it, and neither stage takes what it does not read. Locations, attributes' among
+    /// them, stay what they are.
+    #[must_use]
+    pub fn alone(&self) -> Self {
+        interface::alone(self)
+    }
+
     /// What handing over the values costs that passes have moved to the vertex stage, for a fragment, in full-rate scalar
     /// operations; `None` when none has been moved, and the vertex stage reads no parameters: then it is the author's.
     pub fn handing_over(&self) -> Option<f64> {

@@ -5,13 +5,11 @@
 //! to the value are copied as far as they are in the slice; else values alone are, and they are computed where the copy is
 //! used. What is done to fragments besides, such as a `discard`, is not in it.
 
-use crate::edit::Edit;
+use crate::edit::{Edit, emit};
 use crate::flow::{Flow, Value};
 use crate::operands;
 use crate::rate::ways_out;
-use naga::{
-    Block, Expression, Handle, LocalVariable, Range, Span, Statement, SwitchCase, TypeInner,
-};
+use naga::{Block, Expression, Handle, LocalVariable, Span, Statement, SwitchCase, TypeInner};
 
 /// All that computes a value.
 pub(crate) struct Slice<'a> {
@@ -285,10 +283,6 @@ fn computes(statement: &Statement, value: Value) -> bool {
         Statement::Emit(range) => range.clone().any(|computed| computed == value),
         _ => false,
     }
-}
-
-fn emit(value: Handle<Expression>) -> Statement {
-    Statement::Emit(Range::new_from_bounds(value, value))
 }
 
 /// A copy that is being made.

@@ -384,7 +384,9 @@ impl Ready {
         let averaged: BTreeSet<String> = found
             .levels
             .iter()
-            .flat_map(|level| averaged(&self.base, &level.recipe))
+            .map(|level| &level.recipe)
+            .chain([&found.exact.recipe])
+            .flat_map(|recipe| averaged(&self.base, recipe))
             .collect();
         Lock {
             source: emit::LockedSource {

@@ -219,7 +219,13 @@ pub(crate) fn one_level(
 fn level_alone(source: &Source, levels: &[EmitLevel], at: usize, stem: &str) -> Result<String> {
     let level = at.checked_sub(1).and_then(|at| levels.get(at));
     match level {
-        Some(level) => alone::alone(source, number(levels, at), level, stem),
+        Some(level) => {
+            let level = EmitLevel {
+                shader: level.shader.alone(),
+                ..level.clone()
+            };
+            alone::alone(source, number(levels, at), &level, stem)
+        }
         None => Ok(source.text.clone()),
     }
 }

@@ -45,6 +45,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut moved = Vec::new();
     let mut per_draw = Vec::new();
     let mut averaged = Vec::new();
+    let mut branched = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -64,6 +65,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             None if pass == "vertex-motion" => moved.push(site),
             None if candidate.choice == "exact" => per_draw.push(site),
             Some(("average", _)) => averaged.push(site),
+            Some(("branch" | "branch-at-one", _)) => branched.push(site),
             _ => others.push(format!("{site}: {}", candidate.choice)),
         }
     }
@@ -101,6 +103,9 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     }
     if !per_draw.is_empty() {
         clauses.push(format!("{} per draw", listed(&per_draw, "values")));
+    }
+    if !branched.is_empty() {
+        clauses.push(format!("{} in a branch", listed(&branched, "values")));
     }
     match kept.len() {
         0..=2 => clauses.append(&mut kept),
@@ -160,6 +165,11 @@ mod tests {
             candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
             candidate("vertex-motion", "main.specular", "interpolate"),
             candidate("vertex-motion", "main.sun", "flat"),
+            candidate(
+                "specialize",
+                "main.sheen",
+                "branch main.load#0123456789abcdef",
+            ),
             candidate("to-parameter", "main.tint", "exact"),
             candidate(
                 "to-parameter",
@@ -169,7 +179,7 @@ mod tests {
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex; glow averaged per draw; tint per draw"
+            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex; sheen in a branch; glow averaged per draw; tint per draw"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }

@@ -1,9 +1,10 @@
 //! What the exact tier left out, and why.
 
-use super::{ExactReport, Unread, place_of, steps};
+use super::{ExactReport, ReadReport, Unread, of_vertex, place_of, steps};
 use crate::front::Source;
 use crate::search::Found;
-use lodc_passes::{Shader, Stage, specialize};
+use lodc_passes::texture_removal::TextureRemoval;
+use lodc_passes::{Pass, Shader, Stage, specialize};
 use naga::{AddressSpace, Expression, Function, Handle, Module, TypeInner};
 use std::collections::BTreeSet;
 
@@ -14,12 +15,20 @@ pub(super) fn report(found: &Found, base: &Shader, source: &Source) -> Option<Ex
         return None;
     }
     let [before, after] = exact.used.map(|used| used.work);
+    let read = read(base, &exact.shader);
+    let count = |of: fn(&Read) -> &BTreeSet<String>| [0, 1].map(|at| of(&read[at]).len());
     Some(ExactReport {
         cost: exact.cost(),
         operations: [before.operations(), after.operations()],
         texture_samples: [before.samples, after.samples],
+        vertex_operations: [base, &exact.shader].map(|shader| of_vertex(shader)),
         recipe: steps(&exact.recipe, &[], base, source),
-        unread: unread(base, &exact.shader),
+        read: ReadReport {
+            textures: count(|read| &read.textures),
+            bindings: count(|read| &read.bindings),
+            varyings: count(|read| &read.varyings),
+        },
+        unread: unread(&read),
     })
 }
 
@@ -37,21 +46,29 @@ pub(super) fn left_out(found: &Found, base: &Shader, source: &Source) -> Vec<Str
     let mut said = Vec::new();
     for candidate in &exact.recipe.0 {
         let at = line(&candidate.site);
-        said.push(match specialize::folded(candidate) {
-            Some((place, value)) => {
+        let site = candidate.site.path();
+        let switch = specialize::branched(candidate);
+        said.push(match (specialize::folded(candidate), switch) {
+            (Some((place, value)), _) => {
                 format!("`{place}` is read no more{at}: the scene fixes it at {value}")
             }
-            None => format!(
-                "`{}` needs no operation{at}: an operand is known to be 0 or 1",
-                candidate.site.path()
+            (None, Some(switch)) => format!(
+                "`{site}` is computed in a branch{at}: `{}` switches it off",
+                switch.path()
             ),
+            (None, None) if candidate.pass == TextureRemoval.name() => {
+                format!("`{site}` is not read{at}: its texture has one colour")
+            }
+            (None, None) => {
+                format!("`{site}` needs no operation{at}: an operand is known to be 0 or 1")
+            }
         });
     }
     let Unread {
         textures,
         bindings,
         varyings,
-    } = unread(base, &exact.shader);
+    } = unread(&read(base, &exact.shader));
     for (what, names) in [
         ("texture", textures),
         ("binding", bindings),
@@ -77,14 +94,18 @@ pub(super) fn left_out(found: &Found, base: &Shader, source: &Source) -> Vec<Str
     said
 }
 
-/// What the fragment stage of a shader reads, and that of a variant does not.
-fn unread(base: &Shader, variant: &Shader) -> Unread {
-    let [before, after] = [base, variant].map(|shader| {
+/// What the fragment stage of a shader reads, and that of a variant.
+fn read(base: &Shader, variant: &Shader) -> [Read; 2] {
+    [base, variant].map(|shader| {
         let function = shader.function(Stage::Fragment);
         function.map_or_else(Read::default, |function| {
             Read::of(shader.module(), function)
         })
-    });
+    })
+}
+
+/// What the first one reads, and the second does not.
+fn unread([before, after]: &[Read; 2]) -> Unread {
     let gone = |before: &BTreeSet<String>, after: &BTreeSet<String>| {
         before.difference(after).cloned().collect()
     };

@@ -11,9 +11,9 @@ pub use comparison::{ComparedAt, Comparison};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::front::{Place, Source};
-use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level};
+use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level, work_of};
 use lodc_passes::recipe::pass;
-use lodc_passes::{Class, Goal, Recipe, Shader, Stage, cost};
+use lodc_passes::{Class, Goal, Recipe, Shader, Stage};
 use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
@@ -60,10 +60,25 @@ pub struct ExactReport {
     pub operations: [f64; 2],
     /// Texture samples of a covered fragment there, of both.
     pub texture_samples: [f64; 2],
+    /// What a vertex costs when all branches are taken once, in full-rate scalar operations, of both.
+    pub vertex_operations: [f64; 2],
     /// The changes. Lossless: `error_after` is null.
     pub recipe: Vec<StepReport>,
+    /// How much of the interface the fragment stages of both read.
+    pub read: ReadReport,
     /// What of the interface only the original reads.
     pub unread: Unread,
+}
+
+/// How many parts of a shader's interface its fragment stage reads, and how many that of a variant does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ReadReport {
+    /// Textures.
+    pub textures: [usize; 2],
+    /// Other bindings: samplers and buffers.
+    pub bindings: [usize; 2],
+    /// Inputs of the fragment stage.
+    pub varyings: [usize; 2],
 }
 
 /// What of a shader's interface a variant of it does not read any more, by name.
@@ -327,10 +342,7 @@ impl ErrorReport {
 
 /// Arithmetic of a vertex, static, in full-rate scalar operations.
 fn of_vertex(shader: &Shader) -> f64 {
-    let work = shader
-        .function(Stage::Vertex)
-        .and_then(|function| cost::of_function(shader.module(), function).ok());
-    work.map_or(0.0, |work| work.operations())
+    work_of(shader, Stage::Vertex).operations()
 }
 
 fn level_report(

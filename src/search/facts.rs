@@ -4,8 +4,9 @@
 use super::programs::Programs;
 use super::samples::SampleSet;
 use crate::eval::draw::{Blend, Shading, shade_into, shade_weighed};
-use crate::eval::machine::Profile;
+use crate::eval::machine::{Probe, Profile};
 use crate::eval::program::{Opacity, Program};
+use crate::eval::raster::vertex_profile;
 use crate::eval::texture::{Dimension, Texture};
 use crate::scene::{Scene, SceneTexture, Variation};
 use glam::{Vec2, Vec3};
@@ -25,7 +26,7 @@ impl SampleSet<'_> {
             let words = uniform.stated.clone()?;
             Some((uniform.path.clone(), words))
         });
-        let probes = float_values(shader);
+        let probes = float_values(shader, Stage::Fragment);
         let pairs = op_removal::pairs(shader);
         // A shader always has a fragment stage.
         let entry = shader.index(Stage::Fragment).unwrap_or(0);
@@ -86,46 +87,80 @@ impl SampleSet<'_> {
             facts.pairs.insert((id(value), id(operand)), seen);
         }
         let profiles: Vec<_> = profiles.into_iter().map(|(probes, _)| probes).collect();
-        for (i, value) in probes.iter().enumerate() {
-            let mut fact = ValueFacts::default();
-            let components = profiles
-                .iter()
-                .map(|frame| frame[i].len())
-                .max()
-                .unwrap_or(0);
-            for component in 0..components {
-                let (mut count, mut weight, mut sum) = (0, 0.0, 0.0);
-                let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
-                for probe in profiles.iter().filter_map(|frame| frame[i].get(component)) {
-                    count += probe.count;
-                    weight += probe.weight;
-                    sum += probe.sum;
-                    // A NaN stays: it must be seen.
-                    min = if min.is_nan() || probe.min > min {
-                        min
-                    } else {
-                        probe.min
-                    };
-                    max = if max.is_nan() || probe.max < max {
-                        max
-                    } else {
-                        probe.max
-                    };
-                }
-                fact.count = count;
-                fact.mean.push((sum / weight) as f32);
-                if blended {
-                    fact.weight.push(weight);
-                }
-                fact.min.push(min);
-                fact.max.push(max);
-            }
-            if fact.count > 0 {
-                facts.values.insert(id(*value), fact);
-            }
-        }
+        let of_values = probes.iter().enumerate().filter_map(|(i, value)| {
+            let seen = seen_of(profiles.iter().map(|frame| &frame[i]), blended)?;
+            Some((id(*value), seen))
+        });
+        facts.values.extend(of_values);
         facts
     }
+
+    /// What the vertices of its frames show of every float value of a shader's vertex stage, and what the scene states.
+    pub(super) fn vertex_facts(&self, shader: &Shader) -> Facts {
+        let uniforms = self.stand.scene.uniforms.iter();
+        let stated = uniforms.filter_map(|uniform| {
+            let words = uniform.stated.clone()?;
+            Some((uniform.path.clone(), words))
+        });
+        let mut facts = Facts {
+            fixed: stated.collect(),
+            ..Facts::default()
+        };
+        let Some(entry) = shader.index(Stage::Vertex) else {
+            return facts;
+        };
+        let probes = float_values(shader, Stage::Vertex);
+        let Ok(program) = Program::compile(shader.module(), entry, &probes) else {
+            return facts;
+        };
+        let frames = self.frames.par_iter();
+        let profiles: Vec<_> = frames
+            .map(|frame| vertex_profile(&program, &frame.frame).probes)
+            .collect();
+        let of_values = probes.iter().enumerate().filter_map(|(i, value)| {
+            let seen = seen_of(profiles.iter().map(|frame| &frame[i]), false)?;
+            Some((shader.id(Stage::Vertex, *value).clone(), seen))
+        });
+        facts.values.extend(of_values);
+        facts
+    }
+}
+
+/// What several runs saw of one value; nothing where none computed it.
+fn seen_of<'a>(
+    profiles: impl Iterator<Item = &'a Vec<Probe>> + Clone,
+    is_weighed: bool,
+) -> Option<ValueFacts> {
+    let mut fact = ValueFacts::default();
+    let components = profiles.clone().map(Vec::len).max().unwrap_or(0);
+    for component in 0..components {
+        let (mut count, mut weight, mut sum) = (0, 0.0, 0.0);
+        let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
+        for probe in profiles.clone().filter_map(|frame| frame.get(component)) {
+            count += probe.count;
+            weight += probe.weight;
+            sum += probe.sum;
+            // A NaN stays: it must be seen.
+            min = if min.is_nan() || probe.min > min {
+                min
+            } else {
+                probe.min
+            };
+            max = if max.is_nan() || probe.max < max {
+                max
+            } else {
+                probe.max
+            };
+        }
+        fact.count = count;
+        fact.mean.push((sum / weight) as f32);
+        if is_weighed {
+            fact.weight.push(weight);
+        }
+        fact.min.push(min);
+        fact.max.push(max);
+    }
+    (fact.count > 0).then_some(fact)
 }
 
 /// What was seen of values, each fragment weighed by its share of the picture, but of what their opacity is made of, which
@@ -213,9 +248,9 @@ pub(crate) fn texels_per_pixel(
     (scale.is_finite() && scale > 0.0).then_some(scale)
 }
 
-/// The fragment values that facts are wanted of: f32 scalars, vectors and matrices that are computed.
-fn float_values(shader: &Shader) -> Vec<Handle<Expression>> {
-    let Some(function) = shader.function(Stage::Fragment) else {
+/// The values of a stage that facts are wanted of: f32 scalars, vectors and matrices that are computed.
+fn float_values(shader: &Shader, stage: Stage) -> Vec<Handle<Expression>> {
+    let Some(function) = shader.function(stage) else {
         return Vec::new();
     };
     function
@@ -227,7 +262,7 @@ fn float_values(shader: &Shader) -> Vec<Handle<Expression>> {
         .map(|(value, _)| value)
         .filter(|value| {
             matches!(
-                shader.type_of(Stage::Fragment, *value),
+                shader.type_of(stage, *value),
                 TypeInner::Scalar(Scalar::F32)
                     | TypeInner::Vector {
                         scalar: Scalar::F32,

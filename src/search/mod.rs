@@ -32,6 +32,7 @@ pub mod samples;
 mod trajectory;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
+pub(crate) use exact::work_of;
 pub use exact::{Exact, Scope};
 pub(crate) use facts::texels_per_pixel;
 pub use frontier::{Frontier, Seen};

@@ -110,16 +110,19 @@ mod tests {
     use crate::eval::draw::shade;
     use crate::eval::raster::{Frame, rasterize};
     use crate::front::Source;
+    use crate::scene::mesh::Mesh;
     use crate::scene::{Scene, Split};
     use crate::search::best::best;
     use crate::search::exact::Scope;
     use crate::search::interval::Interval;
     use crate::search::kept::Kept;
     use crate::search::{Level, SampleSet, Samples, Stand, find};
+    use glam::Vec3;
     use lodc_passes::to_parameter::ToParameter;
     use lodc_passes::vertex_motion::VertexMotion;
     use lodc_passes::{Pass, recipe};
     use std::path::Path;
+    use std::sync::Arc;
 
     /// A material of the repository and its scene, with so many pixels along an edge.
     fn material(name: &str, pixels: u32) -> (Shader, Scene) {
@@ -209,6 +212,68 @@ mod tests {
             cost(2.5),
             cost(20.0)
         );
+    }
+
+    /// A sphere of radius 1: an octahedron whose triangles are parted in four so many times.
+    fn sphere(times: u32) -> Mesh {
+        let mut corners: Vec<[Vec3; 3]> = Vec::new();
+        for (x, y, z) in [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (i & 1, i >> 1 & 1, i >> 2)) {
+            let sign = |bit: i32| if bit == 1 { 1.0 } else { -1.0 };
+            let [x, y, z] = [x, y, z].map(sign);
+            let mut corner = [Vec3::X * x, Vec3::Y * y, Vec3::Z * z];
+            if x * y * z < 0.0 {
+                corner.swap(1, 2);
+            }
+            corners.push(corner);
+        }
+        for _ in 0..times {
+            let parted = corners.iter().flat_map(|[a, b, c]| {
+                let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| (*a + *b).normalize());
+                [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
+            });
+            corners = parted.collect();
+        }
+        let positions: Vec<[f32; 3]> = corners
+            .as_flattened()
+            .iter()
+            .map(|p| p.to_array())
+            .collect();
+        let count = positions.len();
+        Mesh {
+            normals: positions.clone(),
+            uvs: vec![[0.0; 2]; count],
+            tangents: vec![[1.0, 0.0, 0.0, 1.0]; count],
+            colours: vec![[1.0; 4]; count],
+            indices: (0..count as u32).collect(),
+            positions,
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn light_at_the_vertices_of_a_finer_mesh_is_nearer_to_the_original() {
+        let (base, scene) = material("clay", 96);
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let excess = |times| {
+            // The same level on another mesh.
+            let mut scene = scene.clone();
+            scene.mesh = Arc::new(sphere(times));
+            let stand = Stand {
+                base: &base,
+                vertex: &vertex,
+                scene: &scene,
+            };
+            let set = SampleSet::new(&stand, 2.5, Samples::Full).expect("it runs");
+            let mut all = VertexMotion
+                .candidates(&base, &set.facts(&base))
+                .into_iter();
+            let light = all.find(|candidate| candidate.site.path() == "fs_main.light");
+            let light = light.expect("the light is offered");
+            let shader = recipe::apply(&base, &light).expect("it was offered");
+            set.figures(&shader).expect("it runs").excess()
+        };
+        let [coarse, fine] = [1, 4].map(excess);
+        assert!(coarse > 0.005 && fine < 0.25 * coarse, "{coarse} {fine}");
     }
 
     #[test]

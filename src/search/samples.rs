@@ -35,7 +35,8 @@ pub struct Stand<'a> {
     pub base: &'a Shader,
     /// The vertex program that every variant is drawn with.
     pub vertex: &'a Program,
-    /// What errors are measured over.
+    /// What errors are measured over. With another mesh in the scene, sets of it measure the same shaders on that: what a
+    /// level with values at the vertices adds on a finer one, or, by [`SampleSet::of_two`], against the first mesh's pictures.
     pub scene: &'a Scene,
 }
 

@@ -24,7 +24,8 @@
 //!
 //! Error. For `texture-mean`, the least-squares error of the constant at that MIP level is the standard
 //! deviation of the texels: [`deviation`] gives it. Its effect on the picture is measured. `only-colour`
-//! is lossless.
+//! is lossless, as weights of a filter that sum to 1 leave one colour what it is, but for rounding: it is of the exact tier, where
+//! pictures are the same to the last bit.
 //!
 //! Declines.
 //! - A texture that the facts do not know: it is dynamic, and may hold anything.
@@ -134,6 +135,10 @@ impl Pass for TextureRemoval {
             Ok((Choice::OnlyColour, _)) => Class::Lossless,
             _ => Class::Lossy,
         }
+    }
+
+    fn is_free(&self, candidate: &Candidate) -> bool {
+        self.class(candidate) == Class::Lossless
     }
 
     fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered> {

@@ -611,15 +611,23 @@ mod meaning {
         let is_wanted = |e: &naga::EntryPoint| e.stage == ShaderStage::Fragment && e.name == name;
         let entry = module.entry_points.iter().position(is_wanted)?;
         let program = Program::compile(module, entry, &[]).ok()?;
-        let mut state = 1u32;
-        let mut random = || {
-            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-            state >> 8
-        };
         let inputs: Vec<Words> = program
             .inputs()
             .iter()
             .map(|slot| {
+                // The same for an input whatever other inputs there are.
+                let place = match slot.binding {
+                    naga::Binding::Location { location, .. } => format!("{location}"),
+                    naga::Binding::BuiltIn(built_in) => format!("{built_in:?}"),
+                };
+                let place = format!("{place} {}", slot.component);
+                let mut state = place.bytes().fold(1u32, |state, byte| {
+                    (state ^ u32::from(byte)).wrapping_mul(16_777_619)
+                });
+                let mut random = || {
+                    state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+                    state >> 8
+                };
                 std::array::from_fn(|_| match slot.kind {
                     ScalarKind::Float => (random() as f32 / (1 << 23) as f32 - 0.5).to_bits(),
                     ScalarKind::Bool => random() & 1,

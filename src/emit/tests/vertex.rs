@@ -171,6 +171,57 @@ fn lod_three_fs_main(in: Varyings, lit: f32, colour: vec3f) -> vec4f {
 }
 
 #[test]
+fn a_file_hands_over_what_its_level_reads() {
+    let source = source(LIT);
+    let mut levels = levels_of_lit();
+    // Lit from its normal alone, with one structure for both ends.
+    let (head, _) = LIT.split_once("    let specular").expect("it has it");
+    let text = format!("{head}    return vec4f(lit);\n}}\n");
+    levels[1].shader = base(&self::source(&text));
+    let files = emit(
+        &source,
+        &base(&source),
+        &levels,
+        output(Form::Files, Target::Wgsl),
+    );
+    let files = files.unwrap_or_else(|e| panic!("{e}"));
+    let text = |at: usize| String::from_utf8_lossy(&files[at].1).into_owned();
+    let second = text(2);
+    has(
+        &second,
+        "struct VaryingsOfLevel {
+    @builtin(position) clip: vec4f,
+    @location(0) normal: vec3f,
+}
+",
+    );
+    has(
+        &second,
+        "fn vs_main(@location(0) position: vec3f, @location(1) normal: vec3f) -> VaryingsOfLevel {",
+    );
+    has(
+        &second,
+        "fn fs_main(in: VaryingsOfLevel) -> @location(0) vec4f {",
+    );
+    assert!(!second.contains("uv"), "{second}");
+    // Lit at the vertices: nothing of the author's is handed over, and the locations are those that they were.
+    let third = text(3);
+    has(
+        &third,
+        "    @builtin(position) clip: vec4f,
+    @location(1) lit: f32,
+    @location(3) colour: vec3f,
+}
+",
+    );
+    has(&third, "@location(2) uv: vec2f) ->");
+    has(
+        &third,
+        "fn fs_main(@location(1) lit: f32, @location(3) colour: vec3f) -> @location(0) vec4f {",
+    );
+}
+
+#[test]
 fn locations_are_counted_over_all_levels() {
     let (base, levels) = (base(&source(LIT)), levels_of_lit());
     let count = |of: &[usize]| shared_locations(&base, of.iter().map(|at| &levels[*at].shader));

@@ -20,7 +20,7 @@ mod vertices;
 
 pub(crate) use quads::Quad;
 #[cfg(feature = "gpu")]
-pub(crate) use vertices::attribute;
+pub(crate) use vertices::{attribute, hand_over_the_same, profile as vertex_profile};
 
 use super::draw::{Blend, DrawState, state_of};
 use super::lane::{LANES, Mask, Words};

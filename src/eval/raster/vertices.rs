@@ -65,6 +65,27 @@ pub(super) fn run_some(program: &Program, frame: &Frame, chosen: &[Vec<usize>]) 
     }
 }
 
+/// What a vertex program executes over the mesh of a frame, with what its probes see.
+pub(crate) fn profile(program: &Program, frame: &Frame) -> Profile {
+    run(program, frame).profile
+}
+
+/// Whether two vertex programs hand over the same for every vertex of a frame's mesh; a zero has no sign.
+pub(crate) fn hand_over_the_same(programs: [&Program; 2], frame: &Frame) -> bool {
+    let [one, other] = programs.map(|program| run(program, frame).outputs);
+    let slots = programs.map(Program::outputs);
+    let place = |slot: &Slot| (slot.binding.clone(), slot.component, slot.kind);
+    let same = |kind: ScalarKind, (one, other): (&u32, &u32)| {
+        let zeros = [one, other].map(|word| f32::from_bits(*word) == 0.0);
+        one == other || (kind == ScalarKind::Float && zeros == [true, true])
+    };
+    slots[0].iter().map(place).eq(slots[1].iter().map(place))
+        && slots[0]
+            .iter()
+            .zip(one.iter().zip(&other))
+            .all(|(slot, (one, other))| one.iter().zip(other).all(|words| same(slot.kind, words)))
+}
+
 /// Fills one input for some vertices, of a draw that begins at `start`.
 fn feed(words: &mut Words, slot: &Slot, (vertices, start): (&[usize], usize), frame: &Frame) {
     let location = match slot.binding {
