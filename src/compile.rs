@@ -125,14 +125,17 @@ impl Request {
         Ok(self.placed(files, &stem))
     }
 
-    /// Puts files whose names begin with `stem` in their place. A single file gets the very name that was asked for.
+    /// Puts files whose names begin with `stem` in their place. A single shader gets the very name that was asked for.
     fn placed(&self, files: Files, stem: &str) -> Files {
-        let single = files.len() == 1;
+        let is_shader = |name: &Path| name.extension().is_none_or(|extension| extension != "rs");
+        let shaders = files.iter().filter(|(name, _)| is_shader(name));
+        let single = shaders.count() == 1;
         let placed = files.into_iter().map(|(name, contents)| {
+            let is_single = single && is_shader(&name);
             let name = name.to_string_lossy();
             let ending = name.strip_prefix(stem).unwrap_or(&name);
             let place = match &self.output {
-                Some(output) if single => output.clone(),
+                Some(output) if is_single => output.clone(),
                 _ => self.beside(ending.trim_start_matches('.')),
             };
             (place, contents)

@@ -18,6 +18,7 @@
 //! files anew; the `expect` line is for hands only, so that blessing carelessly fails.
 
 mod fixtures;
+mod moved;
 mod synthetic;
 
 use fixtures::Goldens;
@@ -53,6 +54,22 @@ fn passes_do_to_their_fixtures_what_the_goldens_say() {
             }
             goldens.compare(&name, &path.with_extension("diff"), &golden);
         }
+    }
+    goldens.finish();
+}
+
+#[test]
+fn parameters_are_written_as_rust_as_the_goldens_say() {
+    let mut goldens = Goldens::of("golden");
+    for path in fixtures::shaders("testdata/parameters") {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let (_, files) = moved::with_parameters(&path);
+        let written = files
+            .iter()
+            .find(|(name, _)| name.extension().is_some_and(|e| e == "rs"));
+        let (_, written) = written.unwrap_or_else(|| panic!("{name} has no parameters"));
+        let written = String::from_utf8_lossy(written);
+        goldens.compare(&name, &path.with_extension("lod.rs"), &written);
     }
     goldens.finish();
 }
@@ -112,7 +129,10 @@ fn stages((source, base): (&Source, &Shader), shader: &Shader, all: bool) -> Str
     };
     let files = emit::emit(source, base, &[level], output)
         .unwrap_or_else(|e| panic!("{}: {e}", source.name));
-    let (_, bytes) = files.last().expect("one file a level");
+    let mut texts = files.iter().rev();
+    let (_, bytes) = texts
+        .find(|(name, _)| name.extension().is_some_and(|e| e == "wgsl"))
+        .expect("one file a level");
     let text = String::from_utf8(bytes.clone()).expect("WGSL is text");
     let start = match all {
         true => text.find("\n\n").map(|header| header + 2),

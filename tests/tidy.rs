@@ -208,8 +208,11 @@ fn sources_open_with_their_subject() {
     for path in with_extension(&files, "rs") {
         let source = text(path).expect("sources are text");
         let first = source.lines().next().unwrap_or("");
+        // What lodc writes is included into other files, which may not have comments of their own kind there.
+        let is_written = path.to_string_lossy().ends_with(".lod.rs");
+        let opens = if is_written { "// " } else { "//! " };
         assert!(
-            first.starts_with("//! ") && first.len() > 20,
+            first.starts_with(opens) && first.len() > 20,
             "{} does not open with what it is about",
             path.display()
         );

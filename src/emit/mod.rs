@@ -19,6 +19,7 @@ mod lines;
 mod lock;
 mod parameters;
 mod print;
+mod rust;
 mod says;
 mod source;
 mod splice;
@@ -187,13 +188,15 @@ fn written(
     target: Target,
     stem: &str,
 ) -> Result<Files> {
-    match target {
-        Target::Wgsl => Ok(vec![(
-            format!("{stem}.wgsl").into(),
-            text.as_bytes().to_vec(),
-        )]),
-        target => targets::write(source, read, target, stem),
+    let mut files = match target {
+        Target::Wgsl => vec![(format!("{stem}.wgsl").into(), text.as_bytes().to_vec())],
+        target => targets::write(source, read, target, stem)?,
+    };
+    if let Some(entry) = targets::parameter_stage(source, read) {
+        let text = rust::written(source, &read.module, entry, stem)?;
+        files.push((format!("{stem}.rs").into(), text.into_bytes()));
     }
+    Ok(files)
 }
 
 /// One level as a shader of its own, the original being at 0 and `levels[0]` at 1: as it is read back, and the files that it is.

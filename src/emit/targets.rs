@@ -76,7 +76,7 @@ pub(crate) fn write(
 }
 
 /// The entry point that fills the parameter block: of those for compute, the one that the source has not.
-fn parameter_stage<'a>(source: &Source, emitted: &'a Source) -> Option<&'a str> {
+pub(crate) fn parameter_stage<'a>(source: &Source, emitted: &'a Source) -> Option<&'a str> {
     let names = |of: &'a Module| {
         let entries = of.entry_points.iter();
         let compute = entries.filter(|entry| entry.stage == ShaderStage::Compute);

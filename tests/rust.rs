@@ -1,0 +1,268 @@
+//! The parameter stage as Rust: compiled here as lodc wrote it, and held against the evaluator on many uniforms.
+//!
+//! What is only added, multiplied, divided, compared and rooted is equal to the bit, and so is everything about integers.
+//! Functions that `libm` and the evaluator each approximate are within the units in the last place that stand here.
+#![deny(warnings)]
+
+mod moved;
+
+use lodc::eval::machine::{Bindings, Resource};
+use lodc::eval::parameters::ParameterStage;
+use lodc_passes::Shader;
+use naga::TypeInner;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// As a host has it: in a module of its own.
+mod functions {
+    include!("../testdata/parameters/functions.lod.rs");
+}
+mod integers {
+    include!("../testdata/parameters/integers.lod.rs");
+}
+mod lights {
+    include!("../testdata/parameters/lights.lod.rs");
+}
+mod matrices {
+    include!("../testdata/parameters/matrices.lod.rs");
+}
+
+/// Uniforms that each fixture is run with.
+const RUNS: usize = 4000;
+
+/// Numbers at random, the same on every run.
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (self.0 >> 32) as u32
+    }
+
+    /// A float: most are ordinary, and some are what is easily got wrong.
+    fn float(&mut self) -> u32 {
+        let awkward = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            0.5,
+            2.5,
+            -3.5,
+            1e-40,
+            3.0,
+            1e-6,
+            7e5,
+            1e38,
+            -1e30,
+            f32::INFINITY,
+        ];
+        self.one_of(&awkward)
+    }
+
+    /// The same of floats that are as large as an angle may be.
+    fn angle(&mut self) -> u32 {
+        let awkward = [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -3.5, 1e-40, 3.0, 1e-6, 7e5];
+        self.one_of(&awkward)
+    }
+
+    fn one_of(&mut self, awkward: &[f32]) -> u32 {
+        let ordinary = (self.next() >> 8) as f32 / (1 << 21) as f32 - 4.0;
+        let pick = self.next() as usize % (awkward.len() * 6);
+        awkward.get(pick).copied().unwrap_or(ordinary).to_bits()
+    }
+
+    /// An integer: most are small, and some have any bits.
+    fn integer(&mut self) -> u32 {
+        let awkward = [0, u32::MAX, i32::MIN as u32, 31, 32, 33];
+        match self.next() % 16 {
+            0 => self.next(),
+            1 => awkward[self.next() as usize % awkward.len()],
+            2..6 => 0u32.wrapping_sub(self.next() % 9),
+            _ => self.next() % 9,
+        }
+    }
+
+    fn words(&mut self, kinds: &str) -> Vec<u32> {
+        let word = |kind| match kind {
+            'f' => self.float(),
+            'a' => self.angle(),
+            _ => self.integer(),
+        };
+        kinds.chars().map(word).collect()
+    }
+}
+
+/// A structure with these words.
+fn of_words<T: Copy>(words: &[u32]) -> T {
+    assert_eq!(size_of::<T>(), 4 * words.len());
+    // SAFETY: the structures here are of f32, i32 and u32 alone, without gaps, so that any words are one; the size is
+    // that of the words.
+    unsafe { words.as_ptr().cast::<T>().read_unaligned() }
+}
+
+fn bytes(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+/// Numbers between two of the same kind, in units in the last place; those that are not numbers are alike.
+fn apart(a: u32, b: u32) -> u32 {
+    let ordered = |bits: u32| match bits as i32 {
+        x if x < 0 => i32::MIN.wrapping_sub(x),
+        x => x,
+    };
+    let [x, y] = [a, b].map(f32::from_bits);
+    match x.is_nan() && y.is_nan() {
+        true => 0,
+        false => ordered(a).abs_diff(ordered(b)),
+    }
+}
+
+/// A fixture, and what the evaluator makes of its parameters.
+struct Fixture {
+    shader: Shader,
+    stage: ParameterStage,
+}
+
+impl Fixture {
+    fn new(name: &str) -> Self {
+        let path = format!(
+            "{}/testdata/parameters/{name}.wgsl",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        let (shader, _) = moved::with_parameters(Path::new(&path));
+        let stage = ParameterStage::of(&shader).unwrap_or_else(|r| panic!("{}", r.what));
+        let stage = stage.expect("it has parameters");
+        Self { shader, stage }
+    }
+
+    /// Holds parameters against the evaluator's for buffers with these words, at bindings from 0 on. `within` says how many
+    /// units in the last place a member may be away from the evaluator's float, if that is a question. Returns how many
+    /// each is.
+    fn hold(
+        &self,
+        buffers: &[&[u32]],
+        found: &[u8],
+        within: impl Fn(&str, f32) -> Option<u32>,
+    ) -> BTreeMap<String, u32> {
+        let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+        let mut bindings = Bindings::default();
+        for (at, words) in (0..).zip(buffers) {
+            bindings.insert((0, at), Resource::Buffer(Arc::new(bytes(words))));
+        }
+        let (blocks, _) = self.stage.blocks(&bindings, 1);
+        for member in self.shader.parameters() {
+            let name = member.name.as_deref().unwrap_or_default();
+            let (count, is_float) = match self.shader.module().types[member.ty].inner {
+                TypeInner::Vector { size, scalar } => {
+                    (size as usize, scalar.kind == naga::ScalarKind::Float)
+                }
+                TypeInner::Scalar(scalar) => (1, scalar.kind == naga::ScalarKind::Float),
+                ref other => panic!("{name} is {other:?}"),
+            };
+            for component in 0..count {
+                let at = member.offset as usize + 4 * component;
+                let word = |bytes: &[u8]| {
+                    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+                };
+                let [found, wanted] = [found, &blocks[0]].map(word);
+                let [a, b] = [found, wanted].map(f32::from_bits);
+                let far = match is_float {
+                    true => apart(found, wanted),
+                    false => found.abs_diff(wanted),
+                };
+                let Some(most) = within(name, b) else {
+                    continue;
+                };
+                assert!(
+                    far <= most,
+                    "{name}[{component}] is {a:e}, and by the evaluator {b:e}: {far} units of {most}\n{buffers:x?}"
+                );
+                let all = seen.entry(name.to_owned()).or_default();
+                *all = far.max(*all);
+            }
+        }
+        seen
+    }
+}
+
+fn exact(_: &str, _: f32) -> Option<u32> {
+    Some(0)
+}
+
+#[test]
+fn a_sum_over_lights_is_the_evaluators() {
+    let fixture = Fixture::new("lights");
+    let mut chance = Chance(1);
+    for _ in 0..RUNS {
+        let camera = chance.words(&"f".repeat(20));
+        let lights = chance.words(&format!("fffi{}", "fffffffi".repeat(40)));
+        let found = lights::lod_parameters(&of_words(&camera), &of_words(&lights));
+        fixture.hold(&[&camera, &lights], &found.to_bytes(), exact);
+    }
+}
+
+#[test]
+fn matrices_and_lists_are_the_evaluators() {
+    let fixture = Fixture::new("matrices");
+    let mut chance = Chance(2);
+    for run in 0..RUNS {
+        let object = chance.words(&"f".repeat(68));
+        let pose = chance.words(&format!("i{}", "f".repeat(19)));
+        let bones = chance.words(&"f".repeat(16 * (1 + run % 3)));
+        let weights = chance.words(&"f".repeat(1 + run % 7));
+        let all: Vec<matrices::Bone> = bones.chunks(16).map(of_words).collect();
+        let given: Vec<f32> = weights.iter().copied().map(f32::from_bits).collect();
+        let found = matrices::lod_parameters(&of_words(&object), &of_words(&pose), &all, &given);
+        let pose: Vec<u32> = pose.into_iter().chain(bones).collect();
+        fixture.hold(&[&object, &pose, &weights], &found.to_bytes(), exact);
+    }
+}
+
+#[test]
+fn integers_and_bits_are_the_evaluators() {
+    let fixture = Fixture::new("integers");
+    let mut chance = Chance(3);
+    for _ in 0..RUNS {
+        let given = chance.words(&format!("{}{}", "i".repeat(16), "f".repeat(8)));
+        let found = integers::lod_parameters(&of_words(&given));
+        fixture.hold(&[&given], &found.to_bytes(), exact);
+    }
+}
+
+#[test]
+fn functions_of_floats_are_within_few_units_of_the_evaluators() {
+    let fixture = Fixture::new("functions");
+    let mut chance = Chance(4);
+    for _ in 0..RUNS {
+        let given = chance.words(&"f".repeat(20));
+        let found = functions::lod_parameters(&of_words(&given));
+        fixture.hold(&[&given], &found.to_bytes(), |name, _| {
+            (name.starts_with("exact")).then_some(0)
+        });
+    }
+    let mut most: BTreeMap<String, u32> = BTreeMap::new();
+    for _ in 0..RUNS {
+        let given = chance.words(&"a".repeat(20));
+        let found = functions::lod_parameters(&of_words(&given));
+        let seen = fixture.hold(&[&given], &found.to_bytes(), |name, wanted| {
+            Some(match name {
+                "hyperbolas" | "areas" => 0,
+                "powers" | "logarithms" | "turns" => 3,
+                "slopes" | "angles" | "quadrants" => 6,
+                // The logarithm's error grows with the exponent.
+                "raised" => 4 + 4 * wanted.abs().log2().abs().min(150.0) as u32,
+                _ => 0,
+            })
+        });
+        for (name, far) in seen {
+            let most = most.entry(name).or_default();
+            *most = far.max(*most);
+        }
+    }
+    println!("units in the last place from the evaluator: {most:?}");
+}
