@@ -138,7 +138,8 @@ impl<'a> Edit<'a> {
         locals.append(variable, Span::UNDEFINED)
     }
 
-    /// From now on the function returns a value, an old or an added one, behind all that it returned.
+    /// From now on the function returns a value, an old or an added one, behind all that it returned; what it returned at the same
+    /// location it returns no more.
     pub(crate) fn add_output(&mut self, output: Output, value: Handle<Expression>) {
         self.outputs.push((output, value));
     }
@@ -438,6 +439,7 @@ impl<'a> Edit<'a> {
                 let (outputs, values): (Vec<_>, Vec<_>) = outputs.into_iter().unzip();
                 let result = function.result.as_ref();
                 let parts = interface::parts(&self.module, result);
+                let replaced = interface::replaced(&self.module, result, &outputs);
                 let ty = interface::result(&mut self.module, result, &outputs);
                 let mut components = match (returned, parts) {
                     (Some(returned), None) => vec![returned],
@@ -456,6 +458,8 @@ impl<'a> Edit<'a> {
                     },
                     (None, _) => Vec::new(),
                 };
+                let mut replaced = replaced.into_iter();
+                components.retain(|_| !replaced.next().unwrap_or(false));
                 components.extend(values);
                 self.function.to_mut().result = Some(naga::FunctionResult { ty, binding: None });
                 let path = format!("{}.return", self.entry_name());

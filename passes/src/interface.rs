@@ -76,7 +76,26 @@ pub(crate) fn parts(module: &Module, result: Option<&FunctionResult>) -> Option<
     }
 }
 
-/// The type of a result with more in it.
+/// For each member of a result, whether something else is returned at its location.
+pub(crate) fn replaced(
+    module: &Module,
+    result: Option<&FunctionResult>,
+    outputs: &[Output],
+) -> Vec<bool> {
+    let Some(TypeInner::Struct { members, .. }) =
+        result.map(|result| &module.types[result.ty].inner)
+    else {
+        return Vec::new();
+    };
+    let is_replaced = |member: &StructMember| {
+        let at = location(member.binding.as_ref());
+        let mut others = outputs.iter().map(|output| location(Some(&output.binding)));
+        at.is_some() && others.any(|other| other == at)
+    };
+    members.iter().map(is_replaced).collect()
+}
+
+/// The type of a result with more in it, in the place of what it has at the same locations.
 pub(crate) fn result(
     module: &mut Module,
     result: Option<&FunctionResult>,
@@ -100,6 +119,8 @@ pub(crate) fn result(
             }
         },
     };
+    let mut replaced = replaced(module, result, outputs).into_iter();
+    members.retain(|_| !replaced.next().unwrap_or(false));
     members.extend(outputs.iter().map(|output| StructMember {
         name: Some(output.name.clone()),
         ty: output.ty,
@@ -241,6 +262,46 @@ pub(crate) fn free_location(shader: &Shader) -> Option<u32> {
     let taken = locations(shader);
     let free = (0..MOST_VARIABLES).find(|location| !taken.contains(location))?;
     (taken.len() < most_locations(shader)).then_some(free)
+}
+
+/// What has been added to the interface and has room for more.
+pub(crate) struct Roomy {
+    /// Which argument of the fragment stage it is.
+    pub(crate) argument: u32,
+    pub(crate) name: String,
+    pub(crate) location: u32,
+    /// How many components it has.
+    pub(crate) components: usize,
+    /// What the vertex stage returns there.
+    pub(crate) value: Handle<Expression>,
+}
+
+/// What has been added to the interface, is interpolated so, and has room for so many components more.
+pub(crate) fn roomy(shader: &Shader, interpolation: Interpolation, more: usize) -> Option<Roomy> {
+    let function = shader.function(Stage::Fragment)?;
+    let added = function.arguments.iter().enumerate();
+    let returned = returned(shader);
+    added
+        .skip(shader.authors.arguments)
+        .find_map(|(at, argument)| {
+            let location = location(argument.binding.as_ref())?;
+            let components = match shader.module().types[argument.ty].inner {
+                TypeInner::Vector { size, .. } => size as usize,
+                _ => 1,
+            };
+            if argument.binding != Some(self::at(location, interpolation)) || components + more > 4
+            {
+                return None;
+            }
+            let is_it = |part: &&Returned| self::location(part.binding.as_ref()) == Some(location);
+            Some(Roomy {
+                argument: at as u32,
+                name: argument.name.clone()?,
+                location,
+                components,
+                value: returned.iter().find(is_it)?.value?,
+            })
+        })
 }
 
 /// The locations of either stage's side of the interface.

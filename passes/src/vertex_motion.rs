@@ -12,6 +12,8 @@
 //! - `interpolate`: it is something else.
 //! - `interpolate-and-normalise`: it is a direction, and made a unit one again.
 //!
+//! When no location is free, it goes behind a value that has been moved before and is handed over in the same way, into one vector.
+//!
 //! Error. `flat` has none. `affine` rounds at the vertices and when it is interpolated, instead of when it is computed:
 //! a few units in the last place of the largest number that goes into it. The others have what the picture shows, on the
 //! mesh at hand; a finer mesh makes it smaller.
@@ -34,7 +36,7 @@
 use crate::cost::{self, FLAT_WEIGHT, INTERPOLATION_WEIGHT};
 use crate::edit::{Edit, New};
 use crate::flow::{Flow, Value};
-use crate::interface::{self, Output};
+use crate::interface::{self, Output, Roomy};
 use crate::rate::{Rate, Rates, Surface};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
@@ -42,7 +44,8 @@ use crate::slice::{Around, Slice, Source};
 use crate::{Facts, Work, operands};
 use naga::{
     BinaryOperator as Op, Binding, Expression, FunctionArgument, Handle, ImageClass, Interpolation,
-    Literal, MathFunction as Math, SampleLevel, Statement, Type, TypeInner, UnaryOperator,
+    Literal, MathFunction as Math, SampleLevel, Statement, SwizzleComponent, Type, TypeInner,
+    UnaryOperator, VectorSize,
 };
 use std::collections::BTreeMap;
 
@@ -72,6 +75,14 @@ impl Choice {
             Self::Affine => "affine",
             Self::Interpolate => "interpolate",
             Self::InterpolateAndNormalise => "interpolate-and-normalise",
+        }
+    }
+
+    fn interpolation(self, surface: Surface) -> Interpolation {
+        match (self, surface) {
+            (Self::Flat, _) => Interpolation::Flat,
+            (Self::Affine, Surface::Linear) => Interpolation::Linear,
+            _ => Interpolation::Perspective,
         }
     }
 
@@ -162,11 +173,19 @@ struct Movable<'a> {
     reads: Vec<Value>,
 }
 
+/// Where a value is handed over.
+enum Room {
+    /// At a location of its own.
+    Free(u32),
+    /// Behind another value, in one vector.
+    Behind(Roomy),
+}
+
 /// What a candidate does.
 struct Plan<'a> {
     movable: Movable<'a>,
     choice: Choice,
-    location: u32,
+    room: Room,
     /// The level of each read whose level was implicit.
     levels: Vec<f32>,
 }
@@ -330,13 +349,24 @@ impl<'a> Study<'a> {
             )));
         }
         let levels = candidate.baked(movable.reads.len())?;
-        let location = interface::free_location(self.flow.shader);
+        let room = self.room(&movable, choice).ok_or_else(full)?;
         Ok(Plan {
             movable,
             choice,
-            location: location.ok_or_else(full)?,
+            room,
             levels,
         })
+    }
+
+    /// Where a value can be handed over, if there is a place.
+    fn room(&self, movable: &Movable<'_>, choice: Choice) -> Option<Room> {
+        let shader = self.flow.shader;
+        if let Some(location) = interface::free_location(shader) {
+            return Some(Room::Free(location));
+        }
+        let components = self.flow.floats(movable.site)?;
+        let interpolation = choice.interpolation(movable.surface);
+        interface::roomy(shader, interpolation, components).map(Room::Behind)
     }
 
     /// How a value can be handed over.
@@ -379,7 +409,6 @@ impl<'a> Study<'a> {
         };
         let works = cost::of_expressions(flow.module, &flow.function.expressions, &types);
         let has_vertex = flow.shader.index(Stage::Vertex).is_some();
-        let room = interface::free_location(flow.shader).is_some();
         // For each value that is offered, how.
         let mut offered: Vec<Vec<Choice>> = vec![Vec::new(); flow.function.expressions.len()];
         let mut found = Vec::new();
@@ -436,7 +465,7 @@ impl<'a> Study<'a> {
                     continue;
                 }
                 offered[site.index()].push(choice);
-                if !room {
+                if self.room(&movable, choice).is_none() {
                     found.push(declined(full()));
                     continue;
                 }
@@ -549,31 +578,47 @@ impl<'a> Study<'a> {
         let Plan {
             movable,
             choice,
-            location,
+            room,
             ..
         } = plan;
         let site = movable.site;
         let path = flow.id(site).path();
-        let interpolation = match (choice, movable.surface) {
-            (Choice::Flat, _) => Interpolation::Flat,
-            (Choice::Affine, Surface::Linear) => Interpolation::Linear,
-            _ => Interpolation::Perspective,
-        };
-        let binding = interface::at(*location, interpolation);
         let name = self
             .short(path)
             .replace(|c: char| !c.is_alphanumeric(), "_");
+        // What is handed over before it in the same vector.
+        let (location, name, before) = match room {
+            Room::Free(location) => (*location, name, None),
+            Room::Behind(other) => {
+                let name = format!("{}_and_{name}", other.name);
+                (other.location, name, Some(other))
+            }
+        };
+        let binding = interface::at(location, choice.interpolation(movable.surface));
+        let own = flow.floats(site).unwrap_or(1);
+        let components = own + before.map_or(0, |before| before.components);
         let ty = |edit: &mut Edit<'_>| {
-            edit.ty(match *flow.inner(site) {
-                TypeInner::Vector { size, scalar } => TypeInner::Vector { size, scalar },
-                _ => TypeInner::Scalar(naga::Scalar::F32),
+            edit.ty(match vector(components) {
+                Some(size) => TypeInner::Vector {
+                    size,
+                    scalar: naga::Scalar::F32,
+                },
+                None => TypeInner::Scalar(naga::Scalar::F32),
             })
         };
 
         let mut edit = Edit::new(flow.shader, Stage::Vertex);
-        let value = movable
+        let mut value = movable
             .slice
             .copy(&mut edit, &mut OfFragment { study: self, plan });
+        if let Some(before) = before {
+            let ty = ty(&mut edit);
+            let components = vec![before.value, value];
+            value = edit.add(
+                format!("{path}.packed"),
+                Expression::Compose { ty, components },
+            );
+        }
         let output = Output {
             name: name.clone(),
             ty: ty(&mut edit),
@@ -589,6 +634,19 @@ impl<'a> Study<'a> {
             binding: Some(binding),
         };
         let mut input = edit.add_argument(format!("{path}.interpolated"), argument);
+        if let Some(before) = before {
+            let packed = input;
+            let is_it = |expression: &Expression| matches!(expression, Expression::FunctionArgument(at) if *at == before.argument);
+            let function = with_output.function(Stage::Fragment);
+            let values = function.into_iter().flat_map(|f| f.expressions.iter());
+            for (value, _) in values.filter(|(_, expression)| is_it(expression)) {
+                let path = format!("{}.unpacked", with_output.id(Stage::Fragment, value).path());
+                let part = edit.add(path, part(packed, 0, before.components));
+                edit.replace(value, New::Value(part));
+            }
+            let part = part(packed, before.components, own);
+            input = edit.add(format!("{path}.unpacked"), part);
+        }
         if *choice == Choice::InterpolateAndNormalise {
             let normalise = Expression::Math {
                 fun: Math::Normalize,
@@ -609,6 +667,31 @@ impl<'a> Study<'a> {
         entry
             .and_then(|entry| path.strip_prefix(entry.name.as_str())?.strip_prefix('.'))
             .unwrap_or(path)
+    }
+}
+
+/// The size of a vector of so many components; `None` of one.
+fn vector(components: usize) -> Option<VectorSize> {
+    match components {
+        2 => Some(VectorSize::Bi),
+        3 => Some(VectorSize::Tri),
+        4 => Some(VectorSize::Quad),
+        _ => None,
+    }
+}
+
+/// So many components of a vector, from one on.
+fn part(whole: Handle<Expression>, from: usize, count: usize) -> Expression {
+    match vector(count) {
+        None => Expression::AccessIndex {
+            base: whole,
+            index: from as u32,
+        },
+        Some(size) => Expression::Swizzle {
+            size,
+            vector: whole,
+            pattern: [0, 1, 2, 3].map(|at| SwizzleComponent::XYZW[(from + at).min(3)]),
+        },
     }
 }
 
@@ -713,5 +796,73 @@ impl Source for OfFragment<'_, '_> {
             *level = SampleLevel::Exact(edit.add(path, number));
         }
         expression
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_free_location_values_share_a_vector() {
+        // Fourteen locations, and two that are free.
+        let members: String = (0..13)
+            .map(|at| format!("@location({at}) v{at}: vec4f, "))
+            .collect();
+        let rest = ", vec4f()".repeat(12);
+        let text = format!(
+            "struct Varyings {{ @builtin(position) clip: vec4f, {members} @location(13) n: vec3f }}
+             @group(0) @binding(0) var<uniform> u: mat4x4f;
+             @vertex fn vs(@location(0) p: vec3f) -> Varyings {{
+                 return Varyings(u * vec4f(p, 1.0), vec4f(p, 1.0){rest}, p);
+             }}
+             @fragment fn fs(in: Varyings) -> @location(0) vec4f {{
+                 let one = exp(dot(in.n, in.n)); let two = sin(in.n.x) * cos(in.n.y);
+                 let three = sin(in.n.yzx) * exp(in.n); let four = cos(in.n.zx * 3.0) * sin(in.n.xy);
+                 return vec4f(three * one, two) * (vec4f(four, four) + in.v0);
+             }}"
+        );
+        let module = naga::front::wgsl::parse_str(&text).expect("it parses");
+        let base = crate::normalize(&module, Some("vs"), "fs", 1000).expect("it has a normal form");
+        let authors = base.function(Stage::Fragment).map(|f| f.arguments.len());
+        let mut shader = base;
+        let mut types = Vec::new();
+        for name in ["one", "two", "three", "four"] {
+            let candidates = VertexMotion.candidates(&shader, &Facts::default());
+            let site = format!("fs.{name}");
+            let mut of_value = candidates.iter().filter(|c| c.site.path() == site);
+            let candidate = of_value.next();
+            let Some(candidate) = candidate else {
+                types.push("full".to_owned());
+                continue;
+            };
+            shader = VertexMotion.apply(&shader, candidate);
+            shader
+                .validate()
+                .unwrap_or_else(|error| panic!("{name}: {error:?}"));
+            let function = shader.function(Stage::Fragment).expect("it has one");
+            let added = function.arguments.iter().skip(authors.unwrap_or(0));
+            let added = added.map(|argument| {
+                let components = match shader.module().types[argument.ty].inner {
+                    TypeInner::Vector { size, .. } => size as usize,
+                    _ => 1,
+                };
+                format!(
+                    "{} {components}",
+                    argument.name.as_deref().unwrap_or_default()
+                )
+            });
+            types.push(added.collect::<Vec<_>>().join(", "));
+        }
+        assert_eq!(
+            types,
+            [
+                "one 1",
+                "one 1, two 1",
+                "one_and_three 4, two 1",
+                "one_and_three 4, two_and_four 3"
+            ]
+        );
+        assert_eq!(shader.handing_over(), Some(7.0 * INTERPOLATION_WEIGHT));
     }
 }

@@ -659,6 +659,65 @@ mod pictures {
         assert!(drawn > 10, "{drawn}");
     }
 
+    /// A text that hands over so many vectors beside a normal and coordinates, and computes two values to be moved.
+    fn crowded(count: usize) -> String {
+        let members: String = (0..count)
+            .map(|at| format!("@location({at}) v{at}: vec4f,\n"))
+            .collect();
+        let zeros = "vec4f(), ".repeat(count);
+        let read: String = (0..count).map(|at| format!(" + in.v{at}")).collect();
+        format!(
+            "struct Frame {{ view_proj: mat4x4f, model: mat4x4f, }}
+             struct Varyings {{
+                 @builtin(position) clip: vec4f,
+                 {members}@location({count}) normal: vec3f,
+                 @location({}) uv: vec2f,
+             }}
+             @group(0) @binding(0) var<uniform> frame: Frame;
+             @vertex
+             fn vs_main(@location(0) position: vec3f, @location(1) normal: vec3f, @location(2) uv: vec2f) -> Varyings {{
+                 let clip = frame.view_proj * frame.model * vec4f(position, 1.0);
+                 return Varyings(clip, {zeros}normal, uv);
+             }}
+             @fragment
+             fn fs_main(in: Varyings) -> @location(0) vec4f {{
+                 let one = exp(-dot(in.normal, vec3f(0.48, 0.6, 0.64))) * in.uv.x;
+                 let two = sin(in.normal * 3.0) * cos(in.uv.x * 4.0);
+                 return vec4f(two * one + two.zxy, 1.0){read};
+             }}",
+            count + 1
+        )
+    }
+
+    #[test]
+    fn values_in_one_vector_are_drawn_as_by_themselves() {
+        let mut pictures = Vec::new();
+        for count in [13, 0] {
+            let source = source(&crowded(count));
+            let mut shader = base(&source);
+            let mut levels = Vec::new();
+            for (autolod, value) in [(1.0, "fs_main.one"), (2.0, "fs_main.two")] {
+                let candidates = VertexMotion.candidates(&shader, &Facts::default());
+                let mut of_value = candidates.iter().filter(|c| c.site.path() == value);
+                shader = VertexMotion.apply(&shader, of_value.next().expect("there is room"));
+                levels.push(EmitLevel {
+                    shader: shader.clone(),
+                    ..level(&source, autolod)
+                });
+            }
+            let function = shader
+                .function(lodc_passes::Stage::Fragment)
+                .expect("it has one");
+            assert_eq!(function.arguments.len(), if count > 0 { 2 } else { 3 });
+            assert!(drawn_alike("crowded", &source, &levels[1..]));
+            let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+            let mut frame = scene.frames(scene.nearest).swap_remove(0);
+            (frame.width, frame.height, frame.grid) = (48, 48, 1);
+            pictures.push(picture(shader.module(), &source, &frame).expect("it is drawn"));
+        }
+        assert_eq!(pictures[0], pictures[1]);
+    }
+
     #[test]
     fn values_that_moved_to_the_vertices_are_drawn_as_their_variants() {
         let paths = fixtures::complete();
