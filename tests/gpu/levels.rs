@@ -110,8 +110,8 @@ struct Emitted {
     whole: Source,
     /// The same, chosen by a uniform.
     uniform: Source,
-    /// Level 0 in a file of its own.
-    first: Source,
+    /// Each level in a file of its own.
+    files: Vec<Source>,
     scene: PathBuf,
     /// `autoLOD` and distance of the others.
     levels: Vec<(f64, f64)>,
@@ -143,7 +143,7 @@ impl Emitted {
             whole: parsed(&compiled.files[0]),
             scene: path.with_extension("toml"),
             uniform: parsed(&uniform[0]),
-            first: parsed(&files[0]),
+            files: files.iter().map(parsed).collect(),
             // A threshold is an f32 in the shader.
             levels: levels
                 .map(|level| (f64::from(level.autolod as f32), level.distance))
@@ -160,7 +160,7 @@ impl Emitted {
         let original_programs = programs(stages(source));
         let near = scene.frames(scene.distances[0]).swap_remove(0);
         let truth = drawn(&mut renderer, &original, scene, &near);
-        let file = pipeline(&renderer, stages(&self.first), scene);
+        let file = pipeline(&renderer, stages(&self.files[0]), scene);
         let file = drawn(&mut renderer, &file, scene, &near);
         assert_eq!(
             bits(&file),
@@ -190,7 +190,7 @@ impl Emitted {
             apart.most(0.0)
         );
 
-        for (auto_lod, distance) in &self.levels {
+        for ((auto_lod, distance), file) in self.levels.iter().zip(&self.files[1..]) {
             let what = format!("{name}, level at {auto_lod:.2}");
             let level = specialised(&self.whole, Some(*auto_lod));
             let level = Stages::of_source(&level, scene);
@@ -208,6 +208,11 @@ impl Emitted {
             let mut apart = Apart::default();
             apart.add(scene, &by_uniform(*auto_lod), &by_gpu);
             wrong.extend(apart.judge(&format!("{what}, by a uniform"), ROUNDED));
+            let mut apart = Apart::default();
+            let file = pipeline(&renderer, stages(file), scene);
+            let file = drawn(&mut renderer, &file, scene, &near);
+            apart.add(scene, &file, &by_gpu);
+            wrong.extend(apart.judge(&format!("{what}, in a file of its own"), ROUNDED));
             let (mut by_gpu, mut by_evaluator) = (Error::default(), Error::default());
             for frame in scene.frames(*distance) {
                 let frame = Frame {
