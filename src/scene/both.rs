@@ -5,7 +5,7 @@
 
 use super::buffers::{self, Buffer, Draw};
 use super::file::{Entries, SceneFile};
-use super::{Scene, attributes, lighting};
+use super::{Files, Scene, attributes, lighting};
 use crate::front::{Source, read_text};
 use crate::{Diagnostic, Result};
 use naga::{Module, TypeInner};
@@ -24,8 +24,8 @@ impl Scene {
     ) -> Result<(Self, Self)> {
         let text = path.map(|path| read_text(path, "scene")).transpose()?;
         let file = path.zip(text.as_deref());
-        let mut a = Self::resolve_beside(original, file, Some(other))?;
-        let mut b = Self::resolve_beside(other, file, Some(original))?;
+        let mut a = Self::resolve_beside(original, file, Some(other), &Files)?;
+        let mut b = Self::resolve_beside(other, file, Some(original), &Files)?;
         if a.object != b.object {
             return Err(Diagnostic::error(format!(
                 "`{}` and `{}` are drawn on different objects: one reads a mesh, the other only the vertices' indices",

@@ -13,6 +13,7 @@ mod buffers;
 pub mod camera;
 mod file;
 mod gltf;
+mod images;
 pub mod init;
 mod layout;
 mod lighting;
@@ -25,6 +26,7 @@ mod shader;
 mod textures;
 
 pub use buffers::{Draw, Uniform, Variation};
+pub use images::{Files, ImageAnswer, ImageSource};
 pub use lighting::SceneLighting;
 pub use semantic::Semantic;
 pub use settings::{Output, ToneMapping};
@@ -217,13 +219,25 @@ impl Scene {
     /// # Errors
     /// When the file cannot be read, and as [`Scene::resolve`].
     pub fn read(source: &Source, path: Option<&Path>) -> Result<Self> {
+        Self::read_with(source, path, &Files)
+    }
+
+    /// As [`Scene::read`], with images from somewhere.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], and when that says so.
+    pub fn read_with(
+        source: &Source,
+        path: Option<&Path>,
+        images: &dyn ImageSource,
+    ) -> Result<Self> {
         let beside = || Some(source.path.as_ref()?.with_extension("toml")).filter(|p| p.exists());
         match path.map(PathBuf::from).or_else(beside) {
             Some(path) => {
                 let text = read_text(&path, "scene")?;
-                Self::resolve(source, Some((&path, &text)))
+                Self::resolve_with(source, Some((&path, &text)), images)
             }
-            None => Self::resolve(source, None),
+            None => Self::resolve_with(source, None, images),
         }
     }
 
@@ -234,7 +248,19 @@ impl Scene {
     /// When the text is no scene, does not fit the shader, or names images that cannot be read; and when
     /// something is neither given nor to be inferred, naming all such things and the lines to add.
     pub fn resolve(source: &Source, file: Option<(&Path, &str)>) -> Result<Self> {
-        Self::resolve_beside(source, file, None)
+        Self::resolve_with(source, file, &Files)
+    }
+
+    /// As [`Scene::resolve`], with images from somewhere.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`], and when that says so.
+    pub fn resolve_with(
+        source: &Source,
+        file: Option<(&Path, &str)>,
+        images: &dyn ImageSource,
+    ) -> Result<Self> {
+        Self::resolve_beside(source, file, None, images)
     }
 
     /// As [`Scene::resolve`]; what the file says of `other` alone is passed over.
@@ -242,8 +268,9 @@ impl Scene {
         source: &Source,
         file: Option<(&Path, &str)>,
         other: Option<&Source>,
+        images: &dyn ImageSource,
     ) -> Result<Self> {
-        Self::attempt(source, file, other)?.map_err(|missing| {
+        Self::attempt(source, file, other, images)?.map_err(|missing| {
             let name = Self::file_name(source, file);
             let place = match file {
                 Some(_) => format!("`{name}`"),
@@ -269,6 +296,7 @@ impl Scene {
         source: &Source,
         file: Option<(&Path, &str)>,
         other: Option<&Source>,
+        images: &dyn ImageSource,
     ) -> Result<std::result::Result<Self, Vec<Missing>>> {
         let name = Self::file_name(source, file);
         let text = file.map_or("", |(_, text)| text);
@@ -295,6 +323,7 @@ impl Scene {
         )?;
         let place = textures::Place {
             folder,
+            source: images,
             seed: settings.seed,
             model: settings.file.as_ref(),
             factors: &said.factors,

@@ -4,6 +4,7 @@
 use super::Inference;
 use super::file::{Entries, Node, Toml, suggest};
 use super::gltf::{MOST_BYTES, Model, add_input};
+use super::images::{ImageAnswer, ImageSource};
 use super::materials::{Factor, Role};
 use crate::eval::image::{Image, Space, decode};
 use crate::eval::machine::Resource;
@@ -209,6 +210,8 @@ impl Kind {
 pub(super) struct Place<'p> {
     /// The scene file's folder.
     pub(super) folder: &'p Path,
+    /// What gives images.
+    pub(super) source: &'p dyn ImageSource,
     /// The scene's seed.
     pub(super) seed: u64,
     /// The model that is drawn, if it is one.
@@ -256,13 +259,19 @@ pub(super) fn resolve(
             continue;
         }
         let entry = textures.get(name);
+        let of_model = place.model.is_some() && kind.is_plain() && Role::infer(name).is_some();
+        let is_asked = entry.is_none() && !of_model && is_used(source, handle);
+        let answer = match is_asked {
+            true => place.source.texture(name)?,
+            false => ImageAnswer::Unknown,
+        };
         let dynamic = match entry.map(|e| e.get_ref()) {
             Some(Node::Text(text)) => text == "dynamic",
             Some(_) => false,
             None if !is_used(source, handle) => continue,
-            None if place.model.is_some() && kind.is_plain() && Role::infer(name).is_some() => {
-                false
-            }
+            None if of_model => false,
+            None if matches!(answer, ImageAnswer::Pixels(_)) => false,
+            None if answer == ImageAnswer::Dynamic => true,
             None => {
                 found
                     .warnings
@@ -281,7 +290,12 @@ pub(super) fn resolve(
             None => None,
         };
         let normals = !dynamic && kind.is_plain() && Role::is_normals(role, name);
+        let given = match answer {
+            ImageAnswer::Pixels(texture) => Some(read.given(texture)?),
+            ImageAnswer::Dynamic | ImageAnswer::Unknown => None,
+        };
         let (images, files) = match (entry, Role::infer(name), place.model) {
+            _ if given.is_some() => (given.into_iter().map(Arc::new).collect(), Vec::new()),
             (Some(entry), ..) if !dynamic => match read.said_role(entry)? {
                 Some((role, space, model)) => read.of_model(role, space, model, &mut found)?,
                 None => {
@@ -906,6 +920,24 @@ impl<'r> Reader<'r> {
         space
     }
 
+    /// A texture as the image source gave it, with MIP levels.
+    fn given(&self, texture: Texture) -> Result<Texture> {
+        if texture.dimension() != self.kind.dimension {
+            return Err(Diagnostic::error(format!(
+                "the image that was given for `{}` is none of a {}",
+                self.name,
+                self.kind.name()
+            ))
+            .with_note(
+                "the image source answers with a texture of that dimension, or that it is dynamic",
+            ));
+        }
+        Ok(match texture.level_count() {
+            1 => texture.with_mip_chain(),
+            _ => texture,
+        })
+    }
+
     fn image(
         &self,
         file: &str,
@@ -929,7 +961,7 @@ impl<'r> Reader<'r> {
                 )
                 .with_note("name a PNG or JPEG file"));
         }
-        let bytes = std::fs::read(&path).map_err(|error| {
+        let bytes = self.place.source.file(&path).map_err(|error| {
             if path.is_dir() {
                 return toml
                     .error(
@@ -1122,6 +1154,7 @@ mod tests {
             let file: SceneFile = toml.parse().unwrap();
             let place = Place {
                 folder: &self.0,
+                source: &crate::scene::Files,
                 seed: 1,
                 model: None,
                 factors: &BTreeSet::new(),
@@ -1214,6 +1247,68 @@ mod tests {
         assert_ne!(images.textures[0].images, images.textures[1].images);
         let again = Folder::new("dynamic2").resolve("").unwrap();
         assert_eq!(images.textures[0].images, again.textures[0].images);
+    }
+
+    /// Knows of two textures, by heart.
+    #[derive(Debug)]
+    struct Memory;
+
+    impl ImageSource for Memory {
+        fn texture(&self, name: &str) -> Result<ImageAnswer> {
+            let texel = Image {
+                width: 1,
+                height: 1,
+                texels: vec![[0.5, 0.25, 0.0, 1.0]],
+            };
+            Ok(match name {
+                "known" | "round" => match Texture::new(Dimension::D2, vec![texel]) {
+                    Ok(texture) => ImageAnswer::Pixels(texture),
+                    Err(_) => ImageAnswer::Unknown,
+                },
+                "moving" => ImageAnswer::Dynamic,
+                _ => ImageAnswer::Unknown,
+            })
+        }
+
+        fn file(&self, _: &Path) -> std::io::Result<Vec<u8>> {
+            Err(std::io::ErrorKind::NotFound.into())
+        }
+    }
+
+    #[test]
+    fn images_come_from_a_source_by_name() {
+        let textures = |more: &str| {
+            let text = format!(
+                "@group(0) @binding(0) var known: texture_2d<f32>;
+                 @group(0) @binding(1) var moving: texture_2d<f32>;
+                 @group(0) @binding(2) var other: texture_2d<f32>;
+                 @group(0) @binding(3) var round: texture_cube<f32>;
+                 @group(0) @binding(4) var s: sampler;
+                 @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {{
+                     return textureSample(known, s, uv) + textureSample(moving, s, uv) + textureSample(other, s, uv){more};
+                 }}"
+            );
+            let source = Source::parse("a.wgsl", &text).unwrap_or_else(|e| panic!("{e}"));
+            crate::scene::Scene::resolve_with(&source, None, &Memory)
+        };
+        let scene = textures("").unwrap_or_else(|e| panic!("{e}"));
+        let dynamic: Vec<(&str, bool)> = scene
+            .textures
+            .iter()
+            .map(|texture| (texture.name.as_str(), texture.dynamic))
+            .collect();
+        assert_eq!(
+            dynamic,
+            [("known", false), ("moving", true), ("other", true)]
+        );
+        assert_eq!(
+            scene.textures[0].images[0].levels()[0].texels,
+            [[0.5, 0.25, 0.0, 1.0]]
+        );
+        let warned = |name: &str| scene.warnings.iter().any(|w| w.message.contains(name));
+        assert!(warned("`other`") && !warned("`moving`"));
+        let error = textures(" + textureSample(round, s, vec3f(uv, 1.0))").expect_err("it is flat");
+        assert!(error.message.contains("given for `round`"), "{error}");
     }
 
     #[test]
@@ -1331,6 +1426,7 @@ mod tests {
         let source = Source::parse("a.wgsl", text).unwrap();
         let place = Place {
             folder: &folder.0,
+            source: &crate::scene::Files,
             seed: 1,
             model: None,
             factors: &BTreeSet::new(),
