@@ -14,6 +14,8 @@ mod kept;
 #[cfg(feature = "search")]
 mod search;
 mod snapshot;
+#[cfg(feature = "search")]
+mod transition;
 
 pub use crate::emit::Files;
 #[cfg(feature = "search")]
@@ -24,7 +26,7 @@ pub use init::{InitRequest, init};
 pub use search::{Compiled, compile, inspect, trajectory};
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
 
-use crate::emit::{self, EmitLevel, Form, Lock, Output, Target};
+use crate::emit::{self, EmitLevel, Form, Lock, Output, Target, Transition};
 use crate::front::{self, Modules, Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
@@ -60,6 +62,13 @@ pub struct Request {
     pub form: Option<Form>,
     /// The language to write; by default that of the lock when it is replayed, else [`Target::Wgsl`].
     pub target: Option<Target>,
+    /// What is drawn where a level begins; by default that of the lock when it is replayed, else [`Transition::Pop`].
+    pub transition: Option<Transition>,
+    /// How wide the band behind a threshold is, in halvings of scale; by default that of the lock when it is replayed, else
+    /// [`emit::BAND`].
+    pub band: Option<f32>,
+    /// Whether each pixel chooses its level, by its texture coordinates.
+    pub per_pixel: bool,
     /// Which shaders are made exact first.
     #[cfg(feature = "search")]
     pub exact: crate::search::Scope,
@@ -107,9 +116,19 @@ impl Request {
 
     /// What is written: what was asked for, else what `otherwise` says.
     fn emission(&self, otherwise: Output) -> Output {
+        let transition = self.transition.unwrap_or(otherwise.transition);
+        // A band wants a value that changes from draw to draw.
+        let form = match transition {
+            Transition::Pop => otherwise.form,
+            _ if otherwise.per_pixel.is_some() => otherwise.form,
+            Transition::Blend | Transition::Dither => Form::Uniform,
+        };
         Output {
-            form: self.form.unwrap_or(otherwise.form),
+            form: self.form.unwrap_or(form),
             target: self.target.unwrap_or(otherwise.target),
+            transition,
+            band: self.band.unwrap_or(otherwise.band),
+            per_pixel: otherwise.per_pixel,
         }
     }
 

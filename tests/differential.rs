@@ -205,12 +205,36 @@ fn specialised(emitted: &Source, autolod: Option<f64>) -> Source {
     }
 }
 
+/// What a scene states of members that are floats, as an application that knows them would.
+fn stated(source: &Source, scene: &Scene) -> Vec<(String, Vec<f64>)> {
+    // Whole numbers are told by their names.
+    let uniforms = scene.uniforms.iter().filter(|uniform| {
+        let name = uniform.path.rsplit('.').next().unwrap_or_default();
+        !source.text.contains(&format!("{name}: u32"))
+            && !source.text.contains(&format!("{name}: i32"))
+    });
+    uniforms
+        .filter_map(|uniform| {
+            let words = uniform.stated.as_ref()?;
+            let numbers = words.iter().map(|word| f64::from(f32::from_bits(*word)));
+            Some((uniform.path.clone(), numbers.collect()))
+        })
+        .collect()
+}
+
 /// A snapshot draws what the branching shader draws there, and needs no more bound than the original.
-fn assert_frozen(request: &Request, at: f32, emitted: &Source, scene: &Scene) {
+fn assert_frozen(
+    request: &Request,
+    at: f32,
+    emitted: &Source,
+    scene: &Scene,
+    values: Vec<(String, Vec<f64>)>,
+) {
     let at = f64::from(at);
     let asked = SnapshotRequest {
         request: request.clone(),
         autolod: at,
+        values,
         output: None,
     };
     let snapshot = compile::snapshot(&asked).unwrap_or_else(|e| panic!("{e}"));
@@ -262,7 +286,11 @@ fn emitted_levels_have_the_errors_that_are_reported() {
 
         write_atomically(&compiled.files).unwrap_or_else(|e| panic!("{e}"));
         for at in compiled.report.levels.iter().map(|level| level.autolod) {
-            assert_frozen(&request, at as f32 + 0.25, &emitted, &scene);
+            let at = at as f32 + 0.25;
+            assert_frozen(&request, at, &emitted, &scene, Vec::new());
+            // What the scene states anyway may be folded: the picture stays the same.
+            let values = stated(&source, &scene);
+            assert_frozen(&request, at, &emitted, &scene, values);
         }
 
         let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));

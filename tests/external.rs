@@ -5,7 +5,7 @@
 
 mod fixtures;
 
-use lodc::emit::{self, EmitLevel, Form, Output, Target};
+use lodc::emit::{self, EmitLevel, Form, Output, Target, Transition};
 use lodc::front::Source;
 use lodc_passes::{Facts, Shader, all_passes, normalize};
 use std::fs;
@@ -131,12 +131,14 @@ fn spirv(module: &naga::Module, info: &naga::valid::ModuleInfo) -> Vec<u32> {
         .expect("naga writes SPIR-V of what it validated")
 }
 
-/// A shader after `count` changes that need no facts, spread over what can be changed.
-fn simplified(base: &Shader, count: usize) -> Shader {
+/// A shader after `count` changes that need no facts, spread over what can be changed; without those that `moves` to the
+/// vertex stage says no to.
+fn simplified(base: &Shader, count: usize, moves: bool) -> Shader {
     let facts = Facts::default();
     let mut shader = base.clone();
     for step in 0..count {
-        let all = all_passes().flat_map(|pass| {
+        let passes = all_passes().filter(|pass| moves || pass.name() != "vertex-motion");
+        let all = passes.flat_map(|pass| {
             let candidates = pass.candidates(&shader, &facts).into_iter();
             candidates.map(move |candidate| (pass, candidate))
         });
@@ -151,13 +153,13 @@ fn simplified(base: &Shader, count: usize) -> Shader {
 }
 
 /// The levels that a shader is emitted with here: its normal form, and two simpler ones.
-fn levels(base: &Shader) -> Vec<EmitLevel> {
+fn levels(base: &Shader, moves: bool) -> Vec<EmitLevel> {
     [0, 3, 12]
         .iter()
         .enumerate()
         .map(|(at, &count)| EmitLevel {
             autolod: 0.5 + at as f32,
-            shader: simplified(base, count),
+            shader: simplified(base, count, moves),
             distance: 2.0,
             error: 0.01,
             cost: 0.5,
@@ -169,6 +171,7 @@ fn levels(base: &Shader) -> Vec<EmitLevel> {
 /// Shows every shader of a folder to the judges in every form, with levels.
 fn emitted(folder: &str) {
     let mut wgsl = Vec::new();
+    let mut of_pixels_count = 0;
     for path in fixtures::shaders(Path::new("testdata").join(folder)) {
         let name = stem(&path);
         let source = Source::read(&path).unwrap_or_else(|e| panic!("{e}"));
@@ -179,13 +182,46 @@ fn emitted(folder: &str) {
             100_000,
         )
         .unwrap_or_else(|e| panic!("{}: {e}", source.name));
-        let levels = levels(&base);
-        for form in [Form::Override, Form::Uniform, Form::Files] {
-            let write = |target| emit::emit(&source, &base, &levels, Output { form, target });
-            for (path, bytes) in write(Target::Wgsl).unwrap_or_else(|e| panic!("{e}")) {
+        let levels = [true, false].map(|moves| levels(&base, moves));
+        let forms = [Form::Override, Form::Uniform, Form::Files].map(|form| Output {
+            form,
+            ..Output::default()
+        });
+        let bands = [Transition::Blend, Transition::Dither].map(|transition| Output {
+            form: Form::Uniform,
+            transition,
+            ..Output::default()
+        });
+        let of_pixels = Output {
+            per_pixel: Some(0.001),
+            ..bands[1]
+        };
+        let all = forms.into_iter().chain(bands).chain([of_pixels]);
+        for output in all {
+            let Output {
+                form,
+                transition,
+                per_pixel,
+                ..
+            } = output;
+            let levels = &levels[usize::from(per_pixel.is_some())];
+            let write = |target| emit::emit(&source, &base, levels, Output { target, ..output });
+            let files = match write(Target::Wgsl) {
+                // What it returns cannot be mixed, its autoLOD is one of a pipeline, or its pixels have no coordinates.
+                Err(_) if transition != Transition::Pop => continue,
+                written => written.unwrap_or_else(|e| panic!("{e}")),
+            };
+            for (path, bytes) in files {
                 let stem = path.file_stem().expect("a name").to_string_lossy();
                 let text = String::from_utf8(bytes).expect("WGSL is text");
-                wgsl.push((format!("{stem}_{}", form.name()), text));
+                of_pixels_count += usize::from(per_pixel.is_some());
+                let of_pixel = if per_pixel.is_some() {
+                    "_per_pixel"
+                } else {
+                    ""
+                };
+                let kind = format!("{stem}_{}_{}{of_pixel}", form.name(), transition.name());
+                wgsl.push((kind, text));
             }
             // Only WGSL carries overrides, also those of the author that choose a level.
             let Ok(files) = write(Target::Spirv) else {
@@ -206,6 +242,7 @@ fn emitted(folder: &str) {
             }
         }
     }
+    assert!(of_pixels_count > 2, "{of_pixels_count} of {folder}");
     if let Some(errors) = tint(&format!("tint_emitted_{folder}"), &wgsl) {
         assert!(errors.is_empty(), "{errors:#?}");
     }

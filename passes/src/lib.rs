@@ -14,6 +14,7 @@ mod fingerprint;
 mod flow;
 mod fold;
 pub mod goal;
+pub mod gradients;
 mod interface;
 mod live;
 pub mod normalize;

@@ -5,7 +5,7 @@ mod child;
 mod progress;
 
 use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request, SnapshotRequest};
-use crate::emit::{self, Form, Target};
+use crate::emit::{self, Form, Target, Transition};
 use crate::front::{Definition, Modules, Stages};
 use crate::search::Scope;
 use crate::{Diagnostic, Result, report};
@@ -71,6 +71,10 @@ struct SnapshotArgs {
     /// The level of detail whose level it is: 0 is the original
     #[arg(long, visible_alias = "at", value_name = "VALUE")]
     autolod: f64,
+    /// A run-time parameter that is known, and is folded in: a uniform's member and its number, or several with commas
+    /// between them; as often as wanted
+    #[arg(long, value_name = "NAME=VALUE", value_parser = known_value)]
+    set: Vec<(String, Vec<f64>)>,
     /// The shader to write [default: beside the source, with .snapshot.wgsl]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -194,6 +198,16 @@ struct CompileArgs {
     /// The language to write [default: the lock's with --locked, else wgsl]
     #[arg(long, value_enum)]
     target: Option<Target>,
+    /// What is drawn where a level begins; all but pop chooses by a uniform [default: the lock's with --locked, else pop]
+    #[arg(long, value_enum)]
+    transition: Option<Transition>,
+    /// How wide the band behind a threshold is in which two levels are drawn, in halvings of scale [default: the lock's with
+    /// --locked, else 0.25]
+    #[arg(long, value_name = "WIDTH")]
+    band: Option<f32>,
+    /// Each pixel chooses its level, by how far texture coordinates go from it to the next
+    #[arg(long)]
+    per_pixel: bool,
     /// How errors are held against the bound: what a level adds to the original's own error, or all of it, as Liang's
     /// paper reads it [default: the scene's, else excess]
     #[arg(long, value_name = "excess|paper", value_parser = reading)]
@@ -317,6 +331,17 @@ fn reading(name: &str) -> std::result::Result<BoundReading, String> {
     BoundReading::of_name(name).ok_or_else(|| "it is `excess` or `paper`".to_owned())
 }
 
+/// Reads `material.roughness=0.4` or `sun.direction=0,1,0`.
+fn known_value(text: &str) -> std::result::Result<(String, Vec<f64>), String> {
+    let wrong = || "it reads `material.roughness=0.4` or `sun.direction=0,1,0`".to_owned();
+    let (name, numbers) = text.split_once('=').ok_or_else(wrong)?;
+    let numbers = numbers
+        .split(',')
+        .map(|number| number.trim().parse::<f64>().ok());
+    let numbers = numbers.collect::<Option<_>>().ok_or_else(wrong)?;
+    Ok((name.trim().to_owned(), numbers))
+}
+
 fn inspect(input: InputArgs) -> Result<()> {
     print(&compile::inspect(&input.request()?)?);
     Ok(())
@@ -368,6 +393,7 @@ fn snapshot(arguments: SnapshotArgs) -> Result<()> {
             ..arguments.shader.request()?
         },
         autolod: arguments.autolod,
+        values: arguments.set,
         output: arguments.output,
     };
     let snapshot = compile::snapshot(&asked)?;
@@ -446,6 +472,9 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.parameters = arguments.host.contains(&HostWord::Parameters);
     request.form = arguments.form;
     request.target = arguments.target;
+    request.transition = arguments.transition;
+    request.band = arguments.band;
+    request.per_pixel = arguments.per_pixel;
     request.exact = match (arguments.specialize, arguments.exact) {
         (true, true) => Scope::All,
         (false, true) => Scope::Levels,
@@ -482,10 +511,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     }
     write(&compiled.files, quiet)?;
     if !quiet {
-        print(&report::next(
-            &compiled.report,
-            request.form.unwrap_or_default(),
-        ));
+        print(&report::next(&compiled.report, compiled.output));
     }
     Ok(())
 }

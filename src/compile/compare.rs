@@ -17,7 +17,7 @@ use crate::report::{ComparedAt, Comparison, Input};
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::search::drawn::{Compiled, Device};
-use crate::search::{ErrorFigures, Measured, OverBlack, SampleSet, Stand, threshold};
+use crate::search::{ErrorFigures, Measured, OverBlack, SampleSet, Samples, Stand, threshold};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod;
 use naga::back::pipeline_constants::process_overrides;
@@ -228,7 +228,7 @@ fn evaluated(
     distance: f64,
     wants_pictures: bool,
 ) -> std::result::Result<Judged, Refused> {
-    let [a, b] = SampleSet::of_two(stands, distance)?;
+    let [a, b] = SampleSet::of_two(stands, distance, Samples::Full)?;
     let [original, other] = stands.map(|stand| stand.base);
     Ok(Judged {
         error: b.figures(other)?,

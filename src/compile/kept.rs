@@ -2,6 +2,7 @@
 
 use super::Request;
 use super::search::Ready;
+use crate::emit::Transition;
 use crate::front::names::nearest;
 use crate::search::{Kept, is_within};
 use crate::{Diagnostic, Result};
@@ -18,6 +19,8 @@ impl Ready {
     pub(super) fn kept(&self, request: &Request) -> Result<Kept> {
         let mut kept = Kept {
             only: passes(&request.only)?,
+            same_vertex_stage: request.per_pixel,
+            apart: request.transition.unwrap_or_default() != Transition::Pop,
             ..Kept::default()
         };
         let read = self.read_names();

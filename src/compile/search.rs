@@ -8,9 +8,12 @@ use crate::eval::program::{Program, Refused};
 use crate::eval::raster::rasterize;
 use crate::eval::refusal;
 use crate::front::Source;
-use crate::report::{Input, Origin, Report};
+use crate::report::{Input, Origin, Report, TransitionReport};
 use crate::scene::{Reading, Scene};
-use crate::search::{self, Found, Level, Progress, SampleSet, Samples, Stand, texels_per_pixel};
+use crate::search::{
+    self, Found, Level, Progress, SampleSet, Samples, Stand, coordinates_per_pixel,
+    texels_per_pixel,
+};
 use crate::{Diagnostic, Result};
 use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS};
 use naga::Expression;
@@ -24,6 +27,8 @@ pub struct Compiled {
     pub files: Files,
     /// The report.
     pub report: Report,
+    /// What is emitted.
+    pub output: Output,
     /// What should be known, located.
     pub warnings: Vec<Box<Diagnostic>>,
 }
@@ -185,7 +190,13 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     ready.ends(&vertex)?;
     let inputs: Vec<PathBuf> = ready.inputs(request).collect();
     // What cannot be written should be known before a search that takes a minute.
-    let emission = request.emission(Output::default());
+    let emission = request.emission(Output {
+        per_pixel: match request.per_pixel {
+            true => Some(ready.coordinates_per_pixel()?),
+            false => None,
+        },
+        ..Output::default()
+    });
     let trial = request.emitted((&ready.source, &ready.base), &[], emission)?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
@@ -208,10 +219,14 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .collect();
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
+    let transitions = ready.transitions(&vertex, &found, &levels, emission)?;
     let lock = request.lock();
     files.push((
         lock.clone(),
-        ready.lock(request, &found, &levels).to_toml().into_bytes(),
+        ready
+            .lock((request, emission), &found, &levels, &transitions)
+            .to_toml()
+            .into_bytes(),
     ));
     let mut origin = ready.origin(request);
     let reached = ready.has_nothing_to_save(&found);
@@ -222,12 +237,14 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     origin
         .warnings
         .extend(visible.iter().map(|w| w.message.clone()));
+    origin.transitions = transitions;
     let report = Report::new(&found, &ready.base, &ready.source, &says, origin);
     files.push((request.beside("lod.json"), report.json().into_bytes()));
     request.spare(&files, &inputs)?;
     Ok(Compiled {
         files,
         report,
+        output: emission,
         warnings: ready
             .scene
             .warnings
@@ -284,6 +301,17 @@ fn emit_level((level, says): (&Level, &String)) -> EmitLevel {
 }
 
 impl Ready {
+    /// How far the mesh's texture coordinates go from pixel to pixel at the nearest distance, where autoLOD is 0.
+    fn coordinates_per_pixel(&self) -> Result<f32> {
+        let scale = coordinates_per_pixel(&self.scene, self.scene.nearest);
+        scale.map(|scale| figure(scale) as f32).ok_or_else(|| {
+            Diagnostic::error(
+                "the object has no texture coordinates, by which each pixel could choose its level",
+            )
+            .with_note("draw another object, or leave `--per-pixel` out")
+        })
+    }
+
     /// Says that the original uses nothing of what levels are to use less of.
     fn has_nothing_to_save(&self, found: &Found) -> Option<Box<Diagnostic>> {
         let goal = self.scene.goal;
@@ -356,6 +384,7 @@ impl Ready {
                 .map(|w| w.message.clone())
                 .collect(),
             inferences: self.inferred(),
+            transitions: Vec::new(),
         }
     }
 
@@ -378,7 +407,13 @@ impl Ready {
             .collect()
     }
 
-    fn lock(&self, request: &Request, found: &Found, levels: &[EmitLevel]) -> Lock {
+    fn lock(
+        &self,
+        (request, emission): (&Request, Output),
+        found: &Found,
+        levels: &[EmitLevel],
+        transitions: &[Option<TransitionReport>],
+    ) -> Lock {
         let path = request.lock();
         let folder = path.parent().unwrap_or(Path::new(""));
         let averaged: BTreeSet<String> = found
@@ -444,7 +479,7 @@ impl Ready {
                         .map(figure),
                 })
                 .collect(),
-            output: request.emission(Output::default()),
+            output: emission,
             bound: self.scene.reading,
             goal: self.scene.goal,
             seed: self.scene.seed,
@@ -456,9 +491,11 @@ impl Ready {
             levels: found
                 .levels
                 .iter()
-                .filter(|level| !level.is_original)
+                .zip(transitions)
+                .filter(|(level, _)| !level.is_original)
                 .zip(levels)
-                .map(|(level, emitted)| emit::LockedLevel {
+                .map(|((level, transition), emitted)| emit::LockedLevel {
+                    band_cost: transition.as_ref().and_then(|transition| transition.cost),
                     autolod: emitted.autolod,
                     distance: emitted.distance,
                     error: emitted.error,

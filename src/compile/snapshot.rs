@@ -3,12 +3,15 @@
 //! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail", 2003, sections 3.2
 //! and 3.3: an application that knows a level's textures can page them in ahead, and bind no others.
 
-use super::{Files, Request, read_lock};
-use crate::emit;
+use super::{Files, Relocked, Request, read_lock};
+use crate::emit::{self, EmitLevel};
 use crate::front::Source;
+use crate::front::names::nearest;
 use crate::front::used::Used;
 use crate::{Diagnostic, Result};
-use naga::TypeInner;
+use lodc_passes::specialize::{self, Specialize};
+use lodc_passes::{Facts, Pass, recipe};
+use naga::{AddressSpace, ArraySize, Module, Scalar, ScalarKind, StorageAccess, TypeInner};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -67,6 +70,9 @@ pub struct SnapshotRequest {
     pub request: Request,
     /// The value of autoLOD whose level it is, from 0.
     pub autolod: f64,
+    /// Run-time parameters that are known by now: members of buffers such as `material.roughness`, each with its numbers, a
+    /// matrix column by column. They are folded into the shader.
+    pub values: Vec<(String, Vec<f64>)>,
     /// The shader to write; by default `<stem>.snapshot.wgsl` beside the source.
     pub output: Option<PathBuf>,
 }
@@ -74,7 +80,7 @@ pub struct SnapshotRequest {
 /// Freezes the level that a value of autoLOD selects, from the lock: a shader without a choice in it.
 ///
 /// # Errors
-/// As [`super::locked`], and when the autoLOD is not a number.
+/// As [`super::locked`], when the autoLOD is not a number, and when a parameter is none of the shader or has another shape.
 pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
     let (request, autolod) = (&asked.request, asked.autolod);
     if autolod.is_nan() {
@@ -91,7 +97,16 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
         ..request.clone()
     };
     let (stem, name) = (request.stem(), format!("{}.snapshot", place.stem()));
-    let (frozen, files) = emit::one_level(&read.source, levels, at, target, (&stem, &name))?;
+    let known = known(&read.source.module, &asked.values)?;
+    let frozen_level = match known.fixed.is_empty() {
+        true => None,
+        false => Some(with_values(&read, at, &known)),
+    };
+    let (one, place_of_one) = match &frozen_level {
+        None => (&levels[..], at),
+        Some(level) => (std::slice::from_ref(level), 1),
+    };
+    let (frozen, files) = emit::one_level(&read.source, one, place_of_one, target, (&stem, &name))?;
     let needs = needs(&frozen);
     let spared = self::needs(&read.source).into_iter();
     let spared = spared.filter(|need| !needs.iter().any(|have| have.name == need.name));
@@ -110,6 +125,134 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
         needs,
         warnings: read.warnings,
     })
+}
+
+/// What run-time parameters state, by their places.
+fn known(module: &Module, values: &[(String, Vec<f64>)]) -> Result<Facts> {
+    let mut known = Facts::default();
+    for (path, numbers) in values {
+        let Some(inner) = member(module, path) else {
+            let variables = module.global_variables.iter();
+            let buffers = variables
+                .filter(|(_, variable)| is_read_only(variable.space))
+                .filter_map(|(_, variable)| variable.name.as_deref());
+            let near = nearest(path, buffers, 3).join("`, `");
+            let error = Diagnostic::error(format!("there is no `{path}` to set"));
+            return Err(error.with_note(match near.is_empty() {
+                true => {
+                    "name a number, a vector or a matrix in a uniform, such as `material.roughness`"
+                        .to_owned()
+                }
+                false => format!(
+                    "name a number, a vector or a matrix in a uniform, such as a member of `{near}`"
+                ),
+            }));
+        };
+        let (count, scalar) = match *inner {
+            TypeInner::Scalar(scalar) => (1, scalar),
+            TypeInner::Vector { size, scalar } => (size as usize, scalar),
+            TypeInner::Matrix {
+                columns,
+                rows,
+                scalar,
+            } => (columns as usize * rows as usize, scalar),
+            _ => (0, Scalar::F32),
+        };
+        let words = numbers.iter().map(|number| word(*number, scalar));
+        let words: Option<Vec<u32>> = words.collect();
+        let Some(words) = words.filter(|words| count > 0 && words.len() == count) else {
+            let kind = match scalar.kind {
+                ScalarKind::Float => "finite number",
+                ScalarKind::Sint => "whole number",
+                _ => "whole number from 0",
+            };
+            return Err(Diagnostic::error(format!("`{path}` is set to what it cannot hold")).with_note(match count {
+                0 => "name a member of it: a number, a vector or a matrix".to_owned(),
+                1 => format!("it is one {kind}"),
+                _ => format!("it is {count} of a {kind}, with commas between them, a matrix column by column"),
+            }));
+        };
+        known.fixed.insert(path.clone(), words);
+    }
+    Ok(known)
+}
+
+/// The bits of a number in a buffer, if it has that number.
+fn word(number: f64, scalar: Scalar) -> Option<u32> {
+    let is_whole = number.fract() == 0.0;
+    match scalar {
+        Scalar::F32 => Some((number as f32).to_bits()).filter(|_| (number as f32).is_finite()),
+        Scalar::I32 => Some((number as i32).cast_unsigned())
+            .filter(|_| is_whole && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&number)),
+        Scalar::U32 => Some(number as u32)
+            .filter(|_| is_whole && (0.0..=f64::from(u32::MAX)).contains(&number)),
+        _ => None,
+    }
+}
+
+/// Whether a shader only reads what is there.
+fn is_read_only(space: AddressSpace) -> bool {
+    match space {
+        AddressSpace::Uniform => true,
+        AddressSpace::Storage { access } => !access.contains(StorageAccess::STORE),
+        _ => false,
+    }
+}
+
+/// The type of `material.roughness` or `lights[2].colour`, in a buffer that is only read.
+fn member<'m>(module: &'m Module, path: &str) -> Option<&'m TypeInner> {
+    let apart = path.replace('[', ".[");
+    let mut steps = apart.split('.');
+    let root = steps.next()?;
+    let mut variables = module.global_variables.iter();
+    let (_, variable) = variables.find(|(_, variable)| {
+        variable.name.as_deref() == Some(root) && is_read_only(variable.space)
+    })?;
+    let mut ty = variable.ty;
+    for step in steps {
+        ty = match (&module.types[ty].inner, step.strip_prefix('[')) {
+            (TypeInner::Array { base, size, .. }, Some(index)) => {
+                let index: u32 = index.strip_suffix(']')?.parse().ok()?;
+                let is_there = match size {
+                    ArraySize::Constant(size) => index < size.get(),
+                    _ => true,
+                };
+                Some(*base).filter(|_| is_there)?
+            }
+            (TypeInner::Struct { members, .. }, None) => {
+                let mut members = members.iter();
+                members
+                    .find(|member| member.name.as_deref() == Some(step))?
+                    .ty
+            }
+            _ => return None,
+        };
+    }
+    Some(&module.types[ty].inner)
+}
+
+/// A level, the original being at 0, with what is known folded into it.
+fn with_values(read: &Relocked, at: usize, known: &Facts) -> EmitLevel {
+    let level = at.checked_sub(1).and_then(|before| read.levels.get(before));
+    let mut shader = level.map_or(&read.base, |level| &level.shader).clone();
+    loop {
+        let folding = Specialize.candidates(&shader, known).into_iter();
+        let mut folding = folding.filter(|candidate| specialize::folded(candidate).is_some());
+        match folding.find_map(|c| recipe::apply(&shader, &c).ok()) {
+            Some(next) => shader = next,
+            None => break,
+        }
+    }
+    let names: Vec<&str> = known.fixed.keys().map(String::as_str).collect();
+    let level = match level {
+        Some(level) => level.clone(),
+        None => EmitLevel::original(read.base.clone()),
+    };
+    EmitLevel {
+        shader,
+        says: format!("{}; {} known", level.says, names.join(", ")),
+        ..level
+    }
 }
 
 /// What the chosen entry points of a shader need bound, by group and binding.

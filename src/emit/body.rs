@@ -42,6 +42,12 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// A predeclared word, if a declaration of the text hides it.
+    pub(crate) fn hides(&self, word: &str) -> Option<Hidden> {
+        let hidden = self.declared.contains(word);
+        hidden.then(|| Hidden(word.to_owned()))
+    }
+
     /// The predeclared word that an item needs and a declaration of the text hides.
     pub(crate) fn hidden_from(&self, item: &Item) -> Option<Hidden> {
         let mut words = item.predeclared.iter();

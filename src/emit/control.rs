@@ -99,6 +99,17 @@ impl Control {
         })
     }
 
+    /// One that each pixel has for itself, which the host has no part in.
+    pub(crate) fn of_pixel() -> Self {
+        Self {
+            value: String::new(),
+            root: String::new(),
+            declaration: None,
+            bindings: 0,
+            by_override: false,
+        }
+    }
+
     /// The author's own autoLOD: a pipeline constant, or a member of something that the host fills.
     fn own(module: &Module) -> Option<Self> {
         let is_number =

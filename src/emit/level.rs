@@ -7,6 +7,7 @@ use super::varyings::{Varyings, location, outputs, same_place};
 use super::{EmitLevel, flaw};
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
+use lodc_passes::gradients::Front;
 use lodc_passes::shader::Stage;
 use lodc_passes::{Shader, operands};
 use naga::proc::Layouter;
@@ -106,6 +107,58 @@ pub(crate) fn parameter_function(
     )
 }
 
+/// What computes the gradients of a level's fragment stage, written with the struct of them that it returns.
+pub(crate) fn gradient_function(
+    body: &Body<'_>,
+    (at, level): (usize, &EmitLevel),
+    front: &Front,
+    (name, result): (&str, &str),
+    block: Option<&ParameterBlock>,
+    names: &Names,
+) -> Result<Printed> {
+    let (mut module, _) = stage_of(body, level, Stage::Fragment)?;
+    let mut function = front.function.clone();
+    for argument in &mut function.arguments {
+        argument.binding = None;
+    }
+    if let Some(block) = block {
+        block.put_into((at, level), &mut module, &mut function);
+    }
+    let members = front.gradients.iter().map(|(name, inner)| {
+        let ty = insert(&mut module, inner);
+        (name.clone(), None, ty)
+    });
+    let members: Vec<_> = members.collect();
+    let ty = insert_struct(&mut module, result, members.into_iter());
+    let returned = match function.body.last() {
+        Some(Statement::Return { value }) => *value,
+        _ => None,
+    };
+    let (Some(of_gradients), Some(returned)) = (ty, returned) else {
+        let error = Diagnostic::error("internal error: gradients have no place in memory");
+        return Err(flaw(error, body.source));
+    };
+    let mut derived = Vec::new();
+    if let Expression::Compose { ty, components } = &mut function.expressions[returned] {
+        *ty = of_gradients;
+        derived.clone_from(components);
+    }
+    function.result = Some(FunctionResult {
+        ty: of_gradients,
+        binding: None,
+    });
+    let mut keep = block.map_or(Vec::new(), |block| block.names().to_vec());
+    keep.push(result);
+    let value = |value: Handle<Expression>| {
+        if let Some(at) = derived.iter().position(|gradient| *gradient == value) {
+            return front.gradients.get(at).map(|(name, _)| name.clone());
+        }
+        let id = front.ids.get(value.index())?.as_ref()?;
+        Some(path_name(&level.shader, id.path()))
+    };
+    written(body, (&mut module, function), (name, &keep), &value, names)
+}
+
 /// A level's module without its entry points, and the function of one of them, without the attributes of its arguments.
 fn stage_of(body: &Body<'_>, level: &EmitLevel, stage: Stage) -> Result<(Module, Function)> {
     let mut module = renamed_module(body, level);
@@ -177,7 +230,7 @@ impl HandedOver<'_> {
                 .position(|of_level| same_place(&of_level.binding, &output.binding));
             let ty = match found {
                 Some(at) => of_level[at].ty,
-                None => self.insert(module, &self.base.module().types[output.ty].inner),
+                None => insert(module, &self.base.module().types[output.ty].inner),
             };
             let name = output.member.unwrap_or_else(|| "position".to_owned());
             members.push((name, output.binding, ty, found));
@@ -189,7 +242,7 @@ impl HandedOver<'_> {
                     .iter()
                     .position(|of_level| location(&of_level.binding) == Some(*own))
             });
-            let ty = self.insert(module, &varying.ty);
+            let ty = insert(module, &varying.ty);
             members.push((varying.name.clone(), varying.binding.clone(), ty, found));
         }
 
@@ -228,8 +281,8 @@ impl HandedOver<'_> {
             components.push(add(function, expression));
         }
         let members = members.into_iter();
-        let members = members.map(|(name, binding, ty, _)| (name, binding, ty));
-        let ty = self.insert_struct(module, members)?;
+        let members = members.map(|(name, binding, ty, _)| (name, Some(binding), ty));
+        let ty = insert_struct(module, self.name, members)?;
         let returned = add(function, Expression::Compose { ty, components });
         let statement = Statement::Return {
             value: Some(returned),
@@ -238,48 +291,48 @@ impl HandedOver<'_> {
         function.result = Some(FunctionResult { ty, binding: None });
         Some(())
     }
+}
 
-    fn insert(&self, module: &mut Module, inner: &TypeInner) -> Handle<Type> {
-        let ty = Type {
-            name: None,
-            inner: inner.clone(),
-        };
-        module.types.insert(ty, Span::UNDEFINED)
-    }
+fn insert(module: &mut Module, inner: &TypeInner) -> Handle<Type> {
+    let ty = Type {
+        name: None,
+        inner: inner.clone(),
+    };
+    module.types.insert(ty, Span::UNDEFINED)
+}
 
-    /// The struct with its members, each with its place in memory. `None` when a member's type has none.
-    fn insert_struct(
-        &self,
-        module: &mut Module,
-        members: impl Iterator<Item = (String, Binding, Handle<Type>)>,
-    ) -> Option<Handle<Type>> {
-        let mut layouter = Layouter::default();
-        layouter.update(module.to_ctx()).ok()?;
-        let mut offset = 0;
-        let mut widest = naga::proc::Alignment::ONE;
-        let members: Vec<StructMember> = members
-            .map(|(name, binding, ty)| {
-                let layout = layouter[ty];
-                let start = layout.alignment.round_up(offset);
-                offset = start + layout.size;
-                widest = widest.max(layout.alignment);
-                StructMember {
-                    name: Some(name),
-                    ty,
-                    binding: Some(binding),
-                    offset: start,
-                }
-            })
-            .collect();
-        let ty = Type {
-            name: Some(self.name.to_owned()),
-            inner: TypeInner::Struct {
-                members,
-                span: widest.round_up(offset),
-            },
-        };
-        Some(module.types.insert(ty, Span::UNDEFINED))
-    }
+/// A struct of this name with its members, each with its place in memory. `None` when a member's type has none.
+fn insert_struct(
+    module: &mut Module,
+    name: &str,
+    members: impl Iterator<Item = (String, Option<Binding>, Handle<Type>)>,
+) -> Option<Handle<Type>> {
+    let mut layouter = Layouter::default();
+    layouter.update(module.to_ctx()).ok()?;
+    let mut offset = 0;
+    let mut widest = naga::proc::Alignment::ONE;
+    let members: Vec<StructMember> = members
+        .map(|(name, binding, ty)| {
+            let layout = layouter[ty];
+            let start = layout.alignment.round_up(offset);
+            offset = start + layout.size;
+            widest = widest.max(layout.alignment);
+            StructMember {
+                name: Some(name),
+                ty,
+                binding,
+                offset: start,
+            }
+        })
+        .collect();
+    let ty = Type {
+        name: Some(name.to_owned()),
+        inner: TypeInner::Struct {
+            members,
+            span: widest.round_up(offset),
+        },
+    };
+    Some(module.types.insert(ty, Span::UNDEFINED))
 }
 
 /// Puts a value at the end of a function.

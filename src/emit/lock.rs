@@ -7,7 +7,7 @@
 //! Numbers that a recipe bakes are there twice: as decimals for people, and as the bits of an f32 in
 //! hexadecimal. The bits decide.
 
-use super::{EmitLevel, Output};
+use super::{EmitLevel, Output, Transition};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
@@ -113,6 +113,9 @@ pub struct LockedLevel {
     pub bound: f64,
     /// Cost, as a share of the original's.
     pub cost: f64,
+    /// What is paid in the band behind `autolod`, where the level before is drawn too, as a share of the original's
+    /// time; `None` without a band, or when it is not known.
+    pub band_cost: Option<f64>,
     /// What changed, for people.
     pub says: String,
     /// What is done to the original, after what is exact.
@@ -170,10 +173,21 @@ impl Lock {
                 ));
             }
         }
+        let output = &self.output;
+        let transition = match output.transition {
+            Transition::Pop => String::new(),
+            transition => format!(
+                ", transition = {}, band = {:?}",
+                string(transition.name()),
+                output.band
+            ),
+        };
+        let per_pixel = output.per_pixel;
+        let per_pixel = per_pixel.map_or_else(String::new, |at| format!(", per_pixel = {at:?}"));
         line(format!(
-            "output = {{ form = {}, target = {} }}",
-            string(self.output.form.name()),
-            string(self.output.target.name())
+            "output = {{ form = {}, target = {}{transition}{per_pixel} }}",
+            string(output.form.name()),
+            string(output.target.name())
         ));
         // The usual one is not said.
         if self.bound != BoundReading::default() {
@@ -218,6 +232,9 @@ impl Lock {
                 ("cost", level.cost),
             ] {
                 line(format!("{key} = {}", number(value)));
+            }
+            if let Some(cost) = level.band_cost {
+                line(format!("band_cost = {}", number(cost)));
             }
             line(format!("says = {}", string(&level.says)));
             line("recipe = [".to_owned());
@@ -292,6 +309,7 @@ impl Lock {
                 floor: level.floor,
                 bound: level.bound,
                 cost: level.cost,
+                band_cost: level.band_cost,
                 says: level.says,
                 recipe,
             });
@@ -544,6 +562,7 @@ struct RawLevel {
     floor: f64,
     bound: f64,
     cost: f64,
+    band_cost: Option<f64>,
     says: String,
     recipe: Vec<Spanned<RawStep>>,
 }
@@ -644,6 +663,9 @@ mod tests {
             output: Output {
                 form: Form::Uniform,
                 target: Target::Spirv,
+                transition: Transition::Dither,
+                band: 0.3,
+                per_pixel: Some(0.00123),
             },
             bound: BoundReading::Paper,
             goal: "time=1,memory=0.2".parse().expect("it is one"),
@@ -658,6 +680,7 @@ mod tests {
                     floor: 1e-9,
                     bound: 0.02,
                     cost: 0.71,
+                    band_cost: Some(1.68),
                     says: "größe, \"so\" it\\is".into(),
                     recipe: Recipe(vec![
                         candidate(
@@ -681,6 +704,7 @@ mod tests {
                     floor: 0.0,
                     bound: 0.0,
                     cost: 1e300,
+                    band_cost: None,
                     says: String::new(),
                     recipe: Recipe::default(),
                 },

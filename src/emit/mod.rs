@@ -18,6 +18,7 @@ mod level;
 mod lines;
 mod lock;
 mod parameters;
+mod per_pixel;
 mod print;
 mod rust;
 mod says;
@@ -26,6 +27,7 @@ mod splice;
 mod targets;
 mod tidy;
 pub(crate) mod tokens;
+mod transition;
 mod varyings;
 mod vertex;
 mod write;
@@ -37,6 +39,8 @@ pub use lock::{
     FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure,
 };
 pub use says::says;
+#[cfg(feature = "search")]
+pub(crate) use transition::band_end;
 pub use varyings::shared_locations;
 pub use write::{writable, write_atomically};
 
@@ -102,14 +106,62 @@ impl Target {
     }
 }
 
-/// What is emitted: the form, and the language.
+/// What is drawn where a level begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Transition {
+    /// The level, all at once.
+    #[default]
+    Pop,
+    /// The level before and the level, mixed.
+    Blend,
+    /// One of the two for each pixel, by a mask on the screen.
+    Dither,
+}
+
+impl Transition {
+    /// Its name on the command line, in the lock and in the report.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pop => "pop",
+            Self::Blend => "blend",
+            Self::Dither => "dither",
+        }
+    }
+}
+
+/// How wide a band is when nothing is said, in halvings of scale.
+pub const BAND: f32 = 0.25;
+
+/// What is emitted: the form, the language, and the transitions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// How a level is chosen.
     pub form: Form,
     /// The language.
     pub target: Target,
+    /// What is drawn where a level begins.
+    pub transition: Transition,
+    /// How wide the band behind a threshold is in which two levels are drawn, in halvings of scale, above 0; a band ends
+    /// where the next level begins. It means nothing where transitions pop.
+    pub band: f32,
+    /// How far texture coordinates go from pixel to pixel where autoLOD is 0, where each pixel chooses its level; `None`
+    /// where the host does.
+    pub per_pixel: Option<f32>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            form: Form::default(),
+            target: Target::default(),
+            transition: Transition::default(),
+            band: BAND,
+            per_pixel: None,
+        }
+    }
 }
 
 /// A level: a variant, and from where it is used. The figures are for people.
@@ -127,6 +179,20 @@ pub struct EmitLevel {
     pub cost: f64,
     /// What changed, for people: lower case, without a full stop.
     pub says: String,
+}
+
+impl EmitLevel {
+    /// The original, from its normal form or from something that draws the same.
+    pub(crate) fn original(shader: Shader) -> Self {
+        Self {
+            autolod: 0.0,
+            shader,
+            distance: 0.0,
+            error: 0.0,
+            cost: 1.0,
+            says: "the original".to_owned(),
+        }
+    }
 }
 
 /// Files to be written: names and contents.
@@ -155,6 +221,7 @@ pub fn emit_as(
     stem: &str,
 ) -> Result<Files> {
     check_thresholds(levels)?;
+    check_band(output)?;
     let source = &*composed::composed(source)?;
     let written = |stem: String, text: String| {
         let read = read_back(&text, source)?;
@@ -162,7 +229,7 @@ pub fn emit_as(
     };
     match output.form {
         Form::Override | Form::Uniform => {
-            let spliced = splice::splice(source, base, levels, output.form, stem)?;
+            let spliced = splice::splice(source, base, levels, output, stem)?;
             if output.target != Target::Wgsl && spliced.by_override {
                 return Err(no_override(output.target));
             }
@@ -178,6 +245,23 @@ pub fn emit_as(
             Ok(files)
         }
     }
+}
+
+/// The shader of all levels in WGSL, as it is read back.
+///
+/// # Errors
+/// As [`emit_as`].
+#[cfg(feature = "search")]
+pub(crate) fn read(
+    source: &Source,
+    base: &Shader,
+    levels: &[EmitLevel],
+    output: Output,
+    stem: &str,
+) -> Result<Source> {
+    let source = &*composed::composed(source)?;
+    let spliced = splice::splice(source, base, levels, output, stem)?;
+    read_back(&spliced.text, source)
 }
 
 /// A text that has been read back, in a language: the names of the files begin with `stem`.
@@ -261,6 +345,43 @@ fn check_thresholds(levels: &[EmitLevel]) -> Result<()> {
         before = level.autolod;
     }
     Ok(())
+}
+
+/// A band has a width, and a text in which autoLOD changes from draw to draw; what each pixel chooses is in one text.
+fn check_band(output: Output) -> Result<()> {
+    if let Some(scale) = output.per_pixel {
+        if output.form == Form::Files {
+            return Err(Diagnostic::error(
+                "a file of its own has one level alone, and its pixels no choice",
+            )
+            .with_note("leave `--form files` out"));
+        }
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(Diagnostic::error(format!(
+                "texture coordinates do not go {scale} from pixel to pixel"
+            ))
+            .with_note("it is a number above 0"));
+        }
+    }
+    if output.transition == Transition::Pop {
+        return Ok(());
+    }
+    if !(output.band > 0.0 && output.band.is_finite()) {
+        let error = format!("a band of {} is none", output.band);
+        return Err(Diagnostic::error(error)
+            .with_note("it is a width in halvings of scale, above 0, such as 0.25"));
+    }
+    match output.form {
+        Form::Files => Err(no_band("a file of its own has one level alone")),
+        Form::Override | Form::Uniform => Ok(()),
+    }
+}
+
+/// Says why a text can have no bands.
+pub(crate) fn no_band(reason: &str) -> Box<Diagnostic> {
+    Diagnostic::error(format!("levels cannot pass into each other: {reason}")).with_note(
+        "`--form uniform` chooses by a value that may change from draw to draw, as it has to; `--transition pop` asks for nothing",
+    )
 }
 
 fn no_override(target: Target) -> Box<Diagnostic> {

@@ -7,11 +7,13 @@ use super::control::Control;
 use super::level::fragment_function;
 use super::lock::FORMAT;
 use super::parameters::Block;
+use super::per_pixel::PerPixel;
 use super::print::{Item, Printed};
 use super::source::{Signature, Text};
+use super::transition::{Bands, band_end, check};
 use super::varyings::Varyings;
 use super::vertex::{VertexStage, has_own_vertex_stage};
-use super::{EmitLevel, Form, at_zero, file_name, number};
+use super::{EmitLevel, Output, Transition, at_zero, file_name, no_band, number};
 use crate::front::Source;
 use crate::front::identifiers::{Names, in_words};
 use crate::{Diagnostic, Result};
@@ -32,26 +34,37 @@ pub(crate) fn splice(
     source: &Source,
     base: &Shader,
     levels: &[EmitLevel],
-    form: Form,
+    output: Output,
     stem: &str,
 ) -> Result<Spliced> {
-    over_text(source, |body| spliced(body, base, levels, form, stem))
+    over_text(source, |body| spliced(body, base, levels, output, stem))
 }
 
 fn spliced(
     body: &Body<'_>,
     base: &Shader,
     levels: &[EmitLevel],
-    form: Form,
+    output: Output,
     stem: &str,
 ) -> Result<std::result::Result<Spliced, Hidden>> {
     let (source, text) = (body.source, &body.text);
-    let varyings = Varyings::of(base, levels.iter().map(|level| &level.shader));
+    let pops = output.transition == Transition::Pop;
+    let varyings = Varyings::of(base, levels.iter().map(|level| &level.shader), !pops);
     let of_vertex = has_own_vertex_stage(base, levels, &varyings);
-    let vertex = source.vertex.as_ref().filter(|_| of_vertex.contains(&true));
+    // Each pixel chooses: what differs in the vertex stage is no more than what the original's does too.
+    let chooses = of_vertex.contains(&true) && output.per_pixel.is_none();
+    let vertex = source.vertex.as_ref().filter(|_| chooses);
     let mut names = Names::default();
     names.reserve(text.words.iter().copied());
-    let control = Control::new(body, form, vertex.is_some(), &mut names)?;
+    let mut control = match output.per_pixel {
+        None => Control::new(body, output.form, vertex.is_some(), &mut names)?,
+        Some(_) => Control::of_pixel(),
+    };
+    if !pops && control.by_override {
+        return Err(no_band(
+            "a pipeline constant is the same for all draws of a pipeline",
+        ));
+    }
     let mut out = header(source, levels, stem);
     let line_break = |out: &mut String| {
         if !out.is_empty() && !out.ends_with('\n') {
@@ -61,6 +74,7 @@ fn spliced(
     let declaration = control.declaration.as_ref();
     let declaration = declaration.map_or(String::new(), |text| format!("\n{text}"));
     if levels.is_empty() {
+        check(source, output.transition)?;
         out.push_str(text.text);
         line_break(&mut out);
         out.push_str(&declaration);
@@ -78,12 +92,32 @@ fn spliced(
     let mut chosen = |name: &String| Chosen::new(body, name, numbers.clone(), &control, &mut names);
     let vertex = vertex.map(&mut chosen).transpose()?;
     let fragment = chosen(&source.fragment)?;
+    let per_pixel = match output.per_pixel {
+        None => None,
+        Some(scale) => {
+            let of = (&fragment, &varyings);
+            match PerPixel::new(body, (base, levels), of, scale, &mut names)? {
+                Ok(per_pixel) => Some(per_pixel),
+                Err(hidden) => return Ok(Err(hidden)),
+            }
+        }
+    };
+    if let Some(per_pixel) = &per_pixel {
+        control.value.clone_from(&per_pixel.value);
+    }
+    let bands = match Bands::new(body, &fragment, output, &mut names)? {
+        Ok(bands) => bands,
+        Err(hidden) => return Ok(Err(hidden)),
+    };
     let stages = || vertex.iter().chain([&fragment]);
     let demoted: Vec<(&Signature, &str)> = stages()
         .map(|stage| (&stage.signature, &*stage.functions[0]))
         .collect();
     let authors = text.demoted(&demoted);
-    out.push_str(&match zero {
+    let of_pixel = per_pixel
+        .as_ref()
+        .and_then(|per_pixel| per_pixel.original.as_ref());
+    out.push_str(&match zero.or(of_pixel) {
         Some(_) => without(&authors, &fragment.functions[0], text.line_end),
         None => authors,
     });
@@ -116,7 +150,14 @@ fn spliced(
                     let head = vertex
                         .signature
                         .with(text, &vertex.arguments, &[], stage.result());
-                    let chosen = branches(&control, levels, &stage.bodies);
+                    let mut drawn = Vec::new();
+                    for (at, level) in levels.iter().enumerate() {
+                        drawn.push((level.autolod, stage.bodies[at].clone()));
+                        if let Some(end) = band_end(levels, at, output) {
+                            drawn.push((end, stage.between[at].clone()));
+                        }
+                    }
+                    let chosen = branches(&control, &drawn, &stage.bodies[levels.len()]);
                     write!(out, "{}\n{head} {{\n{chosen}}}\n", stage.declaration).ok();
                     stage
                 }
@@ -124,13 +165,28 @@ fn spliced(
             }
         }
     };
+    let fronts = match &per_pixel {
+        None => None,
+        Some(per_pixel) => match per_pixel.written((base, levels), block.as_ref(), &mut behind)? {
+            Ok(fronts) => Some(fronts),
+            Err(hidden) => return Ok(Err(hidden)),
+        },
+    };
+    let call = |at: usize| {
+        let mut further = match at {
+            0 => Vec::new(),
+            at => vertex.handed_to(at - 1),
+        };
+        let gradients = match (&per_pixel, &fronts) {
+            (Some(per_pixel), Some((_, members))) => per_pixel.arguments(at, members),
+            _ => Vec::new(),
+        };
+        further.extend(gradients.iter().map(String::as_str));
+        fragment.call(&fragment.functions[at], &further)
+    };
     let bodies: Vec<String> = (0..=levels.len())
         .map(|at| {
-            let further = match at {
-                0 => Vec::new(),
-                at => vertex.handed_to(at - 1),
-            };
-            let call = fragment.call(&fragment.functions[at], &further);
+            let call = call(at);
             match (fragment.signature.result.is_some(), at == levels.len()) {
                 (true, _) => format!("return {call};"),
                 (false, true) => format!("{call};"),
@@ -138,15 +194,57 @@ fn spliced(
             }
         })
         .collect();
-    let further: Vec<&str> = vertex.further.iter().map(|one| &*one.declaration).collect();
+    let mut drawn = Vec::new();
+    for (at, level) in levels.iter().enumerate() {
+        drawn.push((level.autolod, bodies[at].clone()));
+        if let Some((bands, end)) = bands.as_ref().zip(band_end(levels, at, output)) {
+            let calls = [at, at + 1].map(|of| call(of));
+            let before = at
+                .checked_sub(1)
+                .map_or(base, |before| &levels[before].shader);
+            let body = bands.body(
+                (at, &fragment),
+                [&calls[0], &calls[1]],
+                (&control.value, level.autolod, end),
+                [before, &level.shader],
+                body.module,
+            );
+            drawn.push((end, body));
+        }
+    }
+    let further = vertex.further.iter().map(|one| &*one.declaration);
+    let position = bands.as_ref().and_then(|bands| bands.parameter.as_deref());
+    let further: Vec<&str> = further.chain(position).collect();
     let head = (fragment.signature).with(text, &fragment.arguments, &further, None);
-    let chosen = branches(&control, levels, &bodies);
-    write!(out, "\n{head} {{\n{chosen}}}\n").ok();
+    let chosen = branches(&control, &drawn, &bodies[levels.len()]);
+    let before = per_pixel.as_ref().map_or("", |per_pixel| &per_pixel.before);
+    let before: String = before.lines().map(|line| format!("    {line}\n")).collect();
+    write!(out, "\n{head} {{\n{before}{chosen}}}\n").ok();
+    if let Some((text, _)) = &fronts {
+        out.push_str(text);
+    }
 
     let attribute = text
         .derivative_attribute()
         .map_or(String::new(), |a| format!("{a}\n"));
-    for (at, level) in levels.iter().enumerate() {
+    // Behind a branch by pixels nothing looks at its neighbours.
+    let written = per_pixel
+        .as_ref()
+        .map_or(levels, |per_pixel| &per_pixel.levels);
+    if let Some(original) = of_pixel.filter(|_| zero.is_none()) {
+        let name = &fragment.functions[0];
+        let printed = fragment_function(body, (0, original), name, None, &behind.names)?;
+        match behind.take(&printed, name) {
+            Ok(function) => write!(
+                out,
+                "\n// Level 0. {}\n{function}",
+                sentence(&original.says)
+            )
+            .ok(),
+            Err(hidden) => return Ok(Err(hidden)),
+        };
+    }
+    for (at, level) in written.iter().enumerate() {
         let name = &fragment.functions[at + 1];
         let printed = fragment_function(body, (at, level), name, block.as_ref(), &behind.names)?;
         let function = match behind.take(&printed, name) {
@@ -160,6 +258,13 @@ fn spliced(
             writeln!(out, "{vertex}").ok();
         }
         write!(out, "{attribute}{function}").ok();
+    }
+    if let Some(bands) = &bands {
+        out.push_str(&bands.declarations());
+        match whole(bands, base, levels, block.as_ref(), &mut behind)? {
+            Ok(text) => out.push_str(&text),
+            Err(hidden) => return Ok(Err(hidden)),
+        }
     }
     if let Some(block) = &block {
         match block.written(levels, &mut behind)? {
@@ -178,6 +283,8 @@ fn spliced(
 
 /// A stage whose entry point chooses.
 pub(crate) struct Chosen {
+    /// The entry point's name.
+    pub(crate) entry: String,
     pub(crate) signature: Signature,
     /// What the author's function is called now, and those of the levels.
     pub(crate) functions: Vec<String>,
@@ -208,6 +315,7 @@ impl Chosen {
             false => name.to_owned(),
         });
         Ok(Self {
+            entry: entry.to_owned(),
             arguments: arguments.collect(),
             signature,
             functions: std::iter::once(original).chain(of_levels).collect(),
@@ -297,24 +405,66 @@ fn without(text: &str, function: &str, line_end: &str) -> String {
     }
 }
 
-/// The body of an entry point: what it does for the original, and for each level, by the thresholds.
-fn branches(control: &Control, levels: &[EmitLevel], bodies: &[String]) -> String {
+/// The functions that draw the original and levels to the end, and note where a pixel would have been discarded.
+fn whole(
+    bands: &Bands,
+    base: &Shader,
+    levels: &[EmitLevel],
+    block: Option<&Block>,
+    behind: &mut Behind<'_, '_>,
+) -> Result<std::result::Result<String, Hidden>> {
     let mut out = String::new();
-    for (at, level) in levels.iter().enumerate() {
-        let [body, next] = [&bodies[at], &bodies[at + 1]];
-        if body == next || level.autolod == 0.0 {
+    let Some((names, gone)) = bands.whole() else {
+        return Ok(Ok(out));
+    };
+    let original = EmitLevel::original(base.clone());
+    let attribute =
+        (behind.body.text.derivative_attribute()).map_or(String::new(), |a| format!("{a}\n"));
+    for (at, name) in names.iter().enumerate() {
+        let number = match at.checked_sub(1) {
+            None if at_zero(levels).0.is_some() => continue,
+            None => 0,
+            Some(_) => number(levels, at),
+        };
+        // The original has no place in the block, and reads none.
+        let (level, block) = match at.checked_sub(1) {
+            None => ((0, &original), None),
+            Some(level) => ((level, &levels[level]), block),
+        };
+        let printed = fragment_function(behind.body, level, name, block, &behind.names)?;
+        let function = match behind.take(&printed, name) {
+            Ok(function) => function,
+            Err(hidden) => return Ok(Err(hidden)),
+        };
+        let function = function.replace("discard;", &format!("{gone} = true;"));
+        write!(
+            out,
+            "\n// Level {number}, drawn to the end where it discards.\n{attribute}{function}"
+        )
+        .ok();
+    }
+    Ok(Ok(out))
+}
+
+/// The body of an entry point: what is done below each value of autoLOD, and what beyond the last.
+fn branches(control: &Control, drawn: &[(f32, String)], last: &str) -> String {
+    let mut out = String::new();
+    let mut before = 0.0;
+    for (at, (until, body)) in drawn.iter().enumerate() {
+        let next = drawn.get(at + 1).map_or(last, |(_, next)| next);
+        // A level at 0 takes the place of the original; a band may end where the next level begins.
+        if body == next || *until <= before {
             continue;
         }
-        let test = format!("    if !({} >= {:?}) {{", control.value, level.autolod);
+        before = *until;
+        let test = format!("    if !({} >= {until:?}) {{", control.value);
         match body.contains('\n') {
             true => writeln!(out, "{test}\n{}\n    }}", indented(body, "        ")),
             false => writeln!(out, "{test} {body} }}"),
         }
         .ok();
     }
-    if let Some(last) = bodies.last() {
-        writeln!(out, "{}", indented(last, "    ")).ok();
-    }
+    writeln!(out, "{}", indented(last, "    ")).ok();
     out
 }
 

@@ -30,13 +30,33 @@ pub(crate) struct Varyings {
 }
 
 impl Varyings {
-    /// Finds locations for what levels hand over beside what their base does.
-    pub(crate) fn of<'a>(base: &Shader, levels: impl IntoIterator<Item = &'a Shader>) -> Self {
+    /// Finds locations for what levels hand over beside what their base does. Where `apart`, neighbours are drawn together,
+    /// and share one only where their vertex stages are the same.
+    pub(crate) fn of<'a>(
+        base: &Shader,
+        levels: impl IntoIterator<Item = &'a Shader>,
+        apart: bool,
+    ) -> Self {
         let mut varyings = Self::default();
         let mut names: Vec<Vec<&str>> = Vec::new();
+        let mut before: Option<(&Shader, Vec<(u32, usize)>)> = None;
         for level in levels {
             let own = own_inputs(base, level);
             let mut places: Vec<Option<usize>> = vec![None; own.len()];
+            let mut neighbours = BTreeSet::new();
+            if let Some((shader, of_before)) = before.take().filter(|_| apart) {
+                let [one, other] =
+                    [shader, level].map(|shader| shader.stage_fingerprint(Stage::Vertex));
+                for (at, input) in own
+                    .iter()
+                    .enumerate()
+                    .filter(|_| one.is_some() && one == other)
+                {
+                    let same = of_before.iter().find(|(own, _)| *own == input.location);
+                    places[at] = same.map(|(_, place)| *place);
+                }
+                neighbours.extend(of_before.iter().map(|(_, place)| *place));
+            }
             // What is called alike is shared first, so that as many as can be keep their names.
             for alike in [true, false] {
                 for (at, input) in own.iter().enumerate() {
@@ -46,6 +66,7 @@ impl Varyings {
                     let mut shared = varyings.shared.iter().enumerate();
                     let found = shared.find(|(place, varying)| {
                         !places.contains(&Some(*place))
+                            && !neighbours.contains(place)
                             && varying.ty == input.ty
                             && same_interpolation(&varying.binding, input.binding)
                             && (!alike || names[*place].contains(&input.name))
@@ -69,6 +90,7 @@ impl Varyings {
                 }
                 of_level.push((input.location, place));
             }
+            before = Some((level, of_level.clone()));
             varyings.of_levels.push(of_level);
         }
         let mut taken = locations(base);
@@ -89,9 +111,13 @@ impl Varyings {
 
 /// How many locations the vertex stage hands to the fragment stage in a shader that holds all of these levels of
 /// `base`: what the limit on inter-stage variables is held against, beside the built-in inputs of the fragment
-/// stage.
-pub fn shared_locations<'a>(base: &Shader, levels: impl IntoIterator<Item = &'a Shader>) -> usize {
-    locations(base).len() + Varyings::of(base, levels).shared.len()
+/// stage. `apart` says that neighbouring levels are drawn together, in a band.
+pub fn shared_locations<'a>(
+    base: &Shader,
+    levels: impl IntoIterator<Item = &'a Shader>,
+    apart: bool,
+) -> usize {
+    locations(base).len() + Varyings::of(base, levels, apart).shared.len()
 }
 
 /// The locations that a shader's own stages have between them.

@@ -25,6 +25,8 @@ pub(crate) struct VertexStage {
     pub(crate) declaration: String,
     /// What the entry point does, for the original and for each level.
     pub(crate) bodies: Vec<String>,
+    /// What it does in the band behind the threshold of each level.
+    pub(crate) between: Vec<String>,
     /// The function of each level that has one to itself.
     pub(crate) functions: Vec<Option<String>>,
     /// What is handed over beside the author's.
@@ -37,8 +39,18 @@ pub(crate) struct VertexStage {
 pub(crate) struct Further {
     /// How it is declared, `@location(3) specular: vec3f`.
     pub(crate) declaration: String,
-    name: String,
+    pub(crate) name: String,
     ty: String,
+}
+
+impl Further {
+    /// What is handed over where there is no such value.
+    fn zero(&self) -> String {
+        match &*self.ty {
+            "f32" => "0.0".to_owned(),
+            ty => format!("{ty}()"),
+        }
+    }
 }
 
 /// For each level, whether its vertex stage is another than the one of its base.
@@ -61,6 +73,7 @@ impl VertexStage {
         Self {
             declaration: String::new(),
             bodies: Vec::new(),
+            between: vec![String::new(); levels.len()],
             functions: vec![None; levels.len()],
             further: Vec::new(),
             result: None,
@@ -162,12 +175,55 @@ impl VertexStage {
             }
             _ => format!("return {original};"),
         };
-        let bodies = calls.into_iter().map(|function| match function {
+        let bodies = calls.iter().map(|function| match function {
             None => original.clone(),
-            Some(function) => format!("return {};", vertex.call(&function, &[])),
+            Some(function) => format!("return {};", vertex.call(function, &[])),
         });
+        let bodies: Vec<String> = bodies.collect();
+        // Both levels find there what they need: the author's values are the same in all.
+        let [near, far] = ["near", "far"].map(|wish| local.take_local(wish, &BTreeSet::new()));
+        let between = (0..levels.len()).map(|at| {
+            let (Some(name), Some(function)) = (&name, &calls[at + 1]) else {
+                return bodies[at].clone();
+            };
+            if further.is_empty() || calls[at] == calls[at + 1] {
+                return bodies[at].clone();
+            }
+            let before = match &calls[at] {
+                None => vertex.call(&vertex.functions[0], &[]),
+                Some(function) => vertex.call(function, &[]),
+            };
+            let is_original = calls[at].is_none();
+            let author = authors.outputs.iter().map(|output| match &output.member {
+                Some(member) => format!("{near}.{member}"),
+                None if is_original => near.clone(),
+                None => format!("{near}.position"),
+            });
+            let carries = |level: usize, place: usize| {
+                let mut places = varyings.of_levels[level].iter();
+                places.any(|(_, own)| *own == place)
+            };
+            let levels = further
+                .iter()
+                .enumerate()
+                .map(|(place, one)| match at.checked_sub(1) {
+                    _ if carries(at, place) => format!("{far}.{}", one.name),
+                    Some(before) if carries(before, place) && !is_original => {
+                        format!("{near}.{}", one.name)
+                    }
+                    _ => one.zero(),
+                });
+            let all: Vec<String> = author.chain(levels).collect();
+            format!(
+                "let {near} = {before};\nlet {far} = {};\nreturn {name}({});",
+                vertex.call(function, &[]),
+                all.join(", ")
+            )
+        });
+        let between = between.collect();
         Ok(Ok(Self {
-            bodies: bodies.collect(),
+            bodies,
+            between,
             declaration,
             functions,
             result: name.filter(|_| !further.is_empty()),
@@ -212,10 +268,7 @@ impl Returned {
 
     /// What returns the author's outputs with zeros behind them, from a call of the author's function.
     fn extended(&self, ty: &str, further: &[Further], call: &str, variable: &str) -> String {
-        let zeros = further.iter().map(|further| match &*further.ty {
-            "f32" => "0.0".to_owned(),
-            ty => format!("{ty}()"),
-        });
+        let zeros = further.iter().map(Further::zero);
         let members = self.outputs.iter().map(|output| match &output.member {
             Some(member) => format!("{variable}.{member}"),
             None => call.to_owned(),
@@ -230,7 +283,7 @@ impl Returned {
 }
 
 /// The members of a struct as it was written, a line each.
-fn members(text: &str) -> Vec<Further> {
+pub(crate) fn members(text: &str) -> Vec<Further> {
     let lines = text.lines().filter_map(|line| {
         let declaration = line.trim().strip_suffix(',')?;
         let (head, ty) = declaration.rsplit_once(": ")?;

@@ -118,6 +118,8 @@ pub struct LevelReport {
     pub cost: CostReport,
     /// The mesh that goes with it.
     pub mesh: MeshReport,
+    /// How it takes over from the level before; null when it pops.
+    pub transition: Option<TransitionReport>,
     /// Its derivation.
     pub recipe: Vec<StepReport>,
     /// Numerical stability.
@@ -157,6 +159,19 @@ pub struct ErrorReport {
     pub shimmer_floor: f64,
     /// Error of the transition into the level; not measured yet.
     pub transition: Option<f64>,
+}
+
+/// What is drawn where a level begins, beside popping.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TransitionReport {
+    /// `blend` or `dither`.
+    pub kind: &'static str,
+    /// The autoLOD where it begins, the level's own.
+    pub from: f64,
+    /// The autoLOD from which the level is drawn alone.
+    pub until: f64,
+    /// What is paid in between, as a share of the original's estimated time; null when it is not known.
+    pub cost: Option<f64>,
 }
 
 /// The run time of a level.
@@ -275,6 +290,8 @@ pub struct Origin {
     pub warnings: Vec<String>,
     /// What was inferred.
     pub inferences: Vec<String>,
+    /// How each level takes over from the one before.
+    pub transitions: Vec<Option<TransitionReport>>,
 }
 
 impl Report {
@@ -286,8 +303,9 @@ impl Report {
         says: &[String],
         origin: Origin,
     ) -> Self {
-        let level = |(level, says): (&Level, &String)| {
-            level_report(level, says.clone(), base, source, &origin)
+        let level = |(at, (level, says)): (usize, (&Level, &String))| LevelReport {
+            transition: origin.transitions.get(at).cloned().flatten(),
+            ..level_report(level, says.clone(), base, source, &origin)
         };
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -297,7 +315,13 @@ impl Report {
             goal: origin.goal.to_string(),
             variants: found.variants,
             exact: exact::report(found, base, source),
-            levels: found.levels.iter().zip(says).map(level).collect(),
+            levels: found
+                .levels
+                .iter()
+                .zip(says)
+                .enumerate()
+                .map(level)
+                .collect(),
             frontier: found.distances.iter().flat_map(frontier).collect(),
             left_out: exact::left_out(found, base, source)
                 .into_iter()
@@ -381,6 +405,7 @@ fn level_report(
             file: None,
             triangles: origin.triangles,
         },
+        transition: None,
         recipe: steps(&level.recipe, &level.error_after, base, source),
         stability: StabilityReport::default(),
     }

@@ -1,7 +1,7 @@
 //! The report as a person sees it in a terminal: a table of levels, a table of sites.
 
 use super::{Report, place_of};
-use crate::emit::Form;
+use crate::emit::{Form, Output};
 use crate::front::{Place, Source};
 use crate::search::Measured;
 use lodc_passes::{Candidate, Facts, Rates, Shader, Stage, WITH_PARAMETERS, texture_removal};
@@ -78,6 +78,7 @@ pub fn summary(report: &Report) -> String {
     out.push_str(&cost(report));
     out.push_str(&exact(report));
     out.push_str(&held_out(report));
+    out.push_str(&transitions(report));
     if report.bound == "paper" {
         out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
     }
@@ -144,6 +145,30 @@ fn held_out(report: &Report) -> String {
     )
 }
 
+/// What transitions cost; nothing where levels pop.
+fn transitions(report: &Report) -> String {
+    let levels = report.levels.iter().enumerate();
+    let all: Vec<String> = levels
+        .filter_map(|(i, level)| {
+            let transition = level.transition.as_ref()?;
+            let cost = transition
+                .cost
+                .map_or("unknown".to_owned(), |cost| format!("{cost:.2}"));
+            Some(format!(
+                "{} into level {i} until {:.2}, cost {cost}",
+                transition.kind, transition.until
+            ))
+        })
+        .collect();
+    match all.is_empty() {
+        true => String::new(),
+        false => format!(
+            "  both levels are drawn in the bands between: {}\n",
+            all.join("; ")
+        ),
+    }
+}
+
 /// What levels would cost if the host filled a block of parameters, where that is a difference.
 fn with_parameters(report: &Report) -> String {
     let levels = report.levels.iter().enumerate();
@@ -163,11 +188,12 @@ fn with_parameters(report: &Report) -> String {
 }
 
 /// What to do next, after the files have been written.
-pub fn next(report: &Report, form: Form) -> String {
+pub fn next(report: &Report, output: Output) -> String {
     let next = if report.levels.len() < 2 {
         "nothing was worth a level: raise e_max or distance.farthest in the scene"
     } else {
-        match form {
+        match output.form {
+            _ if output.per_pixel.is_some() => "draw with it: each pixel chooses its level",
             Form::Override => {
                 "set the pipeline constant autoLOD, or choose per draw with --form uniform"
             }

@@ -221,12 +221,35 @@ pub(crate) fn texels_per_pixel(
     texture: &SceneTexture,
     distance: f64,
 ) -> Option<f64> {
-    let mesh = &scene.mesh;
     let flat = |image: &Arc<Texture>| image.dimension() == Dimension::D2;
-    if !texture.images.iter().all(flat) || mesh.uvs.is_empty() {
+    if !texture.images.iter().all(flat) {
         return None;
     }
-    let (mut surface, mut texels) = (0.0, 0.0);
+    mapped_per_pixel(scene, distance, &|draw| {
+        let image = texture.images.get(draw).or(texture.images.last())?;
+        let [width, height, _] = image.size(0);
+        Some([width, height])
+    })
+}
+
+/// How far the mesh's own texture coordinates go from one pixel to the next at a distance: the mean over the mesh's area.
+/// `None` for a mesh that has none.
+pub(crate) fn coordinates_per_pixel(scene: &Scene, distance: f64) -> Option<f64> {
+    mapped_per_pixel(scene, distance, &|_| Some([1, 1]))
+}
+
+/// What is mapped by the mesh's texture coordinates to a pixel at a distance, along an edge, where the unit square of them
+/// has that width and height for each draw.
+fn mapped_per_pixel(
+    scene: &Scene,
+    distance: f64,
+    of_draw: &dyn Fn(usize) -> Option<[u32; 2]>,
+) -> Option<f64> {
+    let mesh = &scene.mesh;
+    if mesh.uvs.is_empty() {
+        return None;
+    }
+    let (mut surface, mut all) = (0.0, 0.0);
     for (index, draw) in mesh.draws().into_iter().enumerate() {
         let mut mapped = 0.0;
         for corners in
@@ -240,11 +263,10 @@ pub(crate) fn texels_per_pixel(
                 .length();
             mapped += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
         }
-        let image = texture.images.get(index).or(texture.images.last())?;
-        let [width, height, _] = image.size(0);
-        texels += mapped * f64::from(width) * f64::from(height);
+        let [width, height] = of_draw(index)?;
+        all += mapped * f64::from(width) * f64::from(height);
     }
-    let scale = (texels / surface).sqrt() / autolod::rho(&scene.view(distance));
+    let scale = (all / surface).sqrt() / autolod::rho(&scene.view(distance));
     (scale.is_finite() && scale > 0.0).then_some(scale)
 }
 

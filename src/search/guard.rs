@@ -62,7 +62,8 @@ impl<'a> Guard<'a> {
     fn has_room(&self, shader: &Shader) -> bool {
         let levels = self.levels.iter().chain([shader]);
         shader.handing_over().is_none()
-            || shared_locations(self.stand.base, levels) <= self.stand.base.most_locations()
+            || shared_locations(self.stand.base, levels, self.kept.apart)
+                <= self.stand.base.most_locations()
     }
 
     /// What it knows of an interval that starts at a distance.

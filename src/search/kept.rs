@@ -1,7 +1,8 @@
 //! What the user wants kept: values that are never folded, simplified or left out, values that may change only a
 //! little, and values that go first.
 
-use lodc_passes::{Candidate, Shader, Stage, specialize};
+use lodc_passes::vertex_motion::VertexMotion;
+use lodc_passes::{Candidate, Pass, Shader, Stage, specialize};
 use naga::Expression;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,6 +19,10 @@ pub struct Kept {
     pub(crate) first: BTreeSet<String>,
     /// The passes that may cost error; all when there are none.
     pub(crate) only: BTreeSet<String>,
+    /// Whether levels have the original's vertex stage.
+    pub(crate) same_vertex_stage: bool,
+    /// Whether neighbouring levels are drawn together somewhere, so that they share no value between the stages.
+    pub(crate) apart: bool,
 }
 
 impl Kept {
@@ -32,7 +37,8 @@ impl Kept {
 
     /// Whether a pass may be tried where it costs error.
     pub(crate) fn admits(&self, pass: &str) -> bool {
-        self.only.is_empty() || self.only.contains(pass)
+        let moves = pass == VertexMotion.name() && self.same_vertex_stage;
+        !moves && (self.only.is_empty() || self.only.contains(pass))
     }
 
     /// Whether everything that is to be kept is still in a shader.

@@ -34,7 +34,7 @@ mod trajectory;
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
 pub(crate) use exact::work_of;
 pub use exact::{Exact, Scope};
-pub(crate) use facts::texels_per_pixel;
+pub(crate) use facts::{coordinates_per_pixel, texels_per_pixel};
 pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
 pub use kept::Kept;

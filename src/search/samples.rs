@@ -103,14 +103,18 @@ impl<'a> SampleSet<'a> {
         Ok(set)
     }
 
-    /// All samples of two shaders of one scene at a distance, for [`crate::scene::Scene::read_both`]. The first is the
+    /// The samples of two shaders of one scene at a distance, for [`crate::scene::Scene::read_both`]. The first is the
     /// original, and each picture is of the same view with the same uniforms. What the second set measures, of the
     /// second shader, is against the first one's reference, floor and work.
     ///
     /// # Errors
     /// When the evaluator refuses one of them.
-    pub fn of_two(stands: [&'a Stand<'a>; 2], distance: f64) -> Result<[Self; 2], Refused> {
-        Self::beside(stands, distance, Samples::Full)
+    pub fn of_two(
+        stands: [&'a Stand<'a>; 2],
+        distance: f64,
+        samples: Samples,
+    ) -> Result<[Self; 2], Refused> {
+        Self::beside(stands, distance, samples)
     }
 
     /// The samples of several shaders, the original first.

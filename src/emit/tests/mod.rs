@@ -1,6 +1,10 @@
 //! Emission as a whole: small shaders for what is easily got wrong, and every shader under `testdata/`.
 
 mod parameters;
+#[cfg(feature = "search")]
+mod per_pixel;
+#[cfg(feature = "search")]
+mod transition;
 mod vertex;
 
 use super::*;
@@ -29,7 +33,11 @@ fn source(text: &str) -> Source {
 }
 
 fn output(form: Form, target: Target) -> Output {
-    Output { form, target }
+    Output {
+        form,
+        target,
+        ..Output::default()
+    }
 }
 
 /// The text with two levels, in a form.
@@ -333,9 +341,15 @@ fn entry_points_of_every_shape_are_called() {
     level.says.clear();
     source.text = "@fragment fn fs_main(@builtin(position) p: vec4f) { if p.x < 1.0 { discard; } }"
         .to_owned();
-    let text = splice::splice(&source, &base, &[level], Form::Override, "test")
-        .unwrap_or_else(|e| panic!("{e}"))
-        .text;
+    let text = splice::splice(
+        &source,
+        &base,
+        &[level],
+        output(Form::Override, Target::Wgsl),
+        "test",
+    )
+    .unwrap_or_else(|e| panic!("{e}"))
+    .text;
     has(
         &text,
         "if !(autoLOD >= 0.85) { original_fs_main(p); return; }",

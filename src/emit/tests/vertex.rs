@@ -224,7 +224,8 @@ fn a_file_hands_over_what_its_level_reads() {
 #[test]
 fn locations_are_counted_over_all_levels() {
     let (base, levels) = (base(&source(LIT)), levels_of_lit());
-    let count = |of: &[usize]| shared_locations(&base, of.iter().map(|at| &levels[*at].shader));
+    let count =
+        |of: &[usize]| shared_locations(&base, of.iter().map(|at| &levels[*at].shader), false);
     assert_eq!([count(&[]), count(&[1]), count(&[0])], [2, 2, 3]);
     assert_eq!([count(&[2]), count(&[0, 1, 2]), count(&[2, 2, 0])], [4; 3]);
 }
@@ -342,7 +343,7 @@ fn handing_over(base: &Shader, named: &[(&str, VectorSize)]) -> Option<Shader> {
         },
         Span::UNDEFINED,
     );
-    let taken = shared_locations(base, []) as u32;
+    let taken = shared_locations(base, [], false) as u32;
     let free = (0..).filter(|location| {
         *location >= taken && base.module().types.iter().all(|(_, ty)| match &ty.inner {
             TypeInner::Struct { members, .. } => members.iter().all(|member| !matches!(member.binding, Some(Binding::Location { location: at, .. }) if at == *location)),

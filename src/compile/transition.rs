@@ -1,0 +1,83 @@
+//! What transitions cost: the text that is written, drawn in the middle of each band.
+
+use super::normal_form;
+use super::search::{Ready, vertex_program};
+use crate::Result;
+use crate::emit::{self, EmitLevel, Output, Transition, figure};
+use crate::eval::program::Program;
+use crate::eval::refusal;
+use crate::report::TransitionReport;
+use crate::scene::Scene;
+use crate::search::{Found, SampleSet, Samples, Stand};
+use lodc_passes::autolod;
+
+impl Ready {
+    /// What is drawn where each level that was found begins, and what it costs there; nothing for the original, and
+    /// where levels pop. `levels` are those of `found` that are emitted.
+    pub(super) fn transitions(
+        &self,
+        vertex: &Program,
+        found: &Found,
+        levels: &[EmitLevel],
+        output: Output,
+    ) -> Result<Vec<Option<TransitionReport>>> {
+        let mut transitions = vec![None; found.levels.len()];
+        if output.transition == Transition::Pop || levels.is_empty() {
+            return Ok(transitions);
+        }
+        let output = Output {
+            target: emit::Target::Wgsl,
+            ..output
+        };
+        let emitted = emit::read(&self.source, &self.base, levels, output, "levels")?;
+        let (_, mut scene) = Scene::read_both(&self.source, &emitted, self.scene_file.as_deref())?;
+        let base = normal_form(&emitted)?;
+        let own = vertex_program(&scene, &base).map_err(|refused| refusal(&refused, &emitted))?;
+        // A block of parameters is filled by another stage of the text, which is not drawn here.
+        let is_known = levels
+            .iter()
+            .all(|level| level.shader.parameters().is_empty());
+        let emitted_levels = found.levels.iter().enumerate();
+        let emitted_levels = emitted_levels.filter(|(_, level)| !level.is_original);
+        for (place, (at, _)) in emitted_levels.enumerate() {
+            let Some(until) = emit::band_end(levels, place, output) else {
+                continue;
+            };
+            let from = levels[place].autolod;
+            let middle = f64::midpoint(f64::from(from), f64::from(until));
+            scene.set_auto_lod(middle);
+            let of_scene = &self.scene;
+            let view = of_scene.view(of_scene.nearest);
+            let distance = autolod::distance_of(middle, of_scene.rho0(), &view);
+            let stands = [
+                Stand {
+                    base: &self.base,
+                    vertex,
+                    scene: of_scene,
+                },
+                Stand {
+                    base: &base,
+                    vertex: &own,
+                    scene: &scene,
+                },
+            ];
+            let [original, both] =
+                SampleSet::of_two([&stands[0], &stands[1]], distance, Samples::Search)
+                    .map_err(|refused| refusal(&refused, &self.source))?;
+            let drawn = both
+                .measure(&base)
+                .map_err(|refused| refusal(&refused, &emitted))?;
+            // What the vertex stages of the two do more is theirs.
+            let moved = [at.checked_sub(1), Some(at)].into_iter().flatten();
+            let moved: f64 = moved.map(|of| found.levels[of].used.work.moved).sum();
+            let cost = (drawn.used.work.total() + moved) / original.original().used.work.total();
+            transitions[at] = Some(TransitionReport {
+                kind: output.transition.name(),
+                from: f64::from(from),
+                until: f64::from(until),
+                cost: is_known.then(|| figure(cost)),
+            });
+        }
+        Ok(transitions)
+    }
+}
