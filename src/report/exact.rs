@@ -21,7 +21,7 @@ pub(super) fn report(found: &Found, base: &Shader, source: &Source) -> Option<Ex
         cost: exact.cost(),
         operations: [before.operations(), after.operations()],
         texture_samples: [before.samples, after.samples],
-        vertex_operations: [base, &exact.shader].map(|shader| of_vertex(shader)),
+        vertex_operations: [base, &exact.shader].map(of_vertex),
         recipe: steps(&exact.recipe, &[], base, source),
         read: ReadReport {
             textures: count(|read| &read.textures),
