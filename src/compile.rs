@@ -14,6 +14,7 @@ mod kept;
 #[cfg(feature = "search")]
 mod search;
 mod snapshot;
+mod textures;
 #[cfg(feature = "search")]
 mod transition;
 
@@ -52,6 +53,10 @@ pub struct Request {
     pub only: Vec<String>,
     /// Whether the host fills the parameter block, beside what the scene says.
     pub parameters: bool,
+    /// Whether the host binds textures that are made for levels, beside what the scene says.
+    pub textures: bool,
+    /// How many MiB those of a level may have together; by default as the scene says, which is without a limit by default.
+    pub max_texture_memory: Option<u32>,
     /// The shader to write; by default `<stem>.lod.wgsl` beside the source.
     pub output: Option<PathBuf>,
     /// The entry points, where there are several.
@@ -215,7 +220,9 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
 pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
     let read = read_lock(request)?;
     let emission = request.emission(read.lock.output);
-    let files = request.emitted((&read.source, &read.base), &read.levels, emission)?;
+    let mut files = request.emitted((&read.source, &read.base), &read.levels, emission)?;
+    let textures = emit::generated_textures(&read.source, &read.levels, emission.form)?;
+    files.extend(request.texture_files(textures::again(request, &read, &textures)?));
     request.spare(&files, std::slice::from_ref(&request.shader))?;
     Ok((files, read.warnings))
 }
@@ -279,7 +286,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
     for texture in &lock.textures {
         if changed(&texture.file, &texture.hash) {
             return Err(Diagnostic::error(format!(
-                "the lock is stale: the texture `{}` has changed since its mean was taken, or is gone",
+                "the lock is stale: the texture `{}` has changed since its mean was taken or it went into another one, or is gone",
                 texture.file
             ))
             .with_note("renew it: run lodc without `--locked`, and commit what it writes"));

@@ -12,6 +12,7 @@
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
 //! // facts: fixed material.flags 5                     stated by the scene; a float has a point
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
+//! // facts: sampler tiled repeats                       along both axes
 //! ```
 //!
 //! The facts are those of [`synthetic`] otherwise. `LODC_BLESS=1 cargo test --test golden` writes the golden
@@ -83,7 +84,7 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let source = Source::parse(&name, text.as_str()).unwrap_or_else(|e| fail(&e));
     let shader = normal_form(&source).unwrap_or_else(|e| fail(&e));
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
-    let all = ["vertex-motion", "to-parameter"].contains(&pass.name());
+    let all = ["vertex-motion", "to-parameter", "texture-collapse"].contains(&pass.name());
     let stages = |variant: &Shader, all| stages((&source, &shader), variant, all);
     let mut golden = String::new();
     let mut offered = 0;
@@ -164,6 +165,10 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                     .get_mut(name)
                     .zip(slopes)
                     .map(|(texture, slopes)| texture.slopes = slopes)
+            }
+            ["sampler", name, "repeats"] => {
+                facts.repeating.insert(name.into());
+                Some(())
             }
             ["dynamic", path] => {
                 facts.dynamic.insert(path.into());

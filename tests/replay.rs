@@ -207,7 +207,10 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
         let entries: Vec<_> = entries.collect();
         let again = lodc_passes::normalize_stages(shader.module(), &entries, 100_000)
             .expect("edits make shaders smaller");
-        assert_eq!(again.fingerprint(), shader.fingerprint(), "{text}\n{toml}");
+        // What a module alone does not say is how the texels of new textures are computed.
+        if shader.generated().is_empty() {
+            assert_eq!(again.fingerprint(), shader.fingerprint(), "{text}\n{toml}");
+        }
         assert_eq!(wgsl(&replayed), text, "{toml}");
         if let Err(error) = naga::front::wgsl::parse_str(&text) {
             panic!("{}: {}\n{toml}", subject.name, error.emit_to_string(&text));

@@ -5,6 +5,7 @@
 //! it is available, and brings it to normal form again.
 
 use crate::fingerprint::Declared;
+use crate::generated::Generated;
 use crate::interface::{self, Output};
 use crate::live;
 use crate::normalize::forward::{self, Changes, Origin};
@@ -14,8 +15,9 @@ use crate::parameters;
 use crate::semantics::{Constant, Shape};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
-    Arena, Block, EntryPoint, Expression, Function, FunctionArgument, Handle, Literal,
-    LocalVariable, Module, Scalar, Span, Statement, Type, TypeInner, VectorSize,
+    AddressSpace, Arena, Block, EntryPoint, Expression, Function, FunctionArgument, GlobalVariable,
+    Handle, Literal, LocalVariable, Module, ResourceBinding, Scalar, Span, Statement, Type,
+    TypeInner, VectorSize,
 };
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -66,6 +68,8 @@ pub struct Edit<'a> {
     outputs: Vec<(Output, Handle<Expression>)>,
     /// What it stores in the parameter block beside what it stored: names, types and values.
     parameters: Vec<(String, Handle<Type>, Handle<Expression>)>,
+    /// The textures that it reads beside those that it read.
+    generated: Vec<Generated>,
     /// What is done before it returns.
     before_return: Block,
     branches: Vec<Branch>,
@@ -73,6 +77,8 @@ pub struct Edit<'a> {
     expressions: Arena<Expression>,
     /// The paths of the added values.
     added: Vec<String>,
+    /// The new paths of old values that are others now.
+    renamed: BTreeMap<usize, String>,
     replaced: BTreeMap<Handle<Expression>, Handle<Expression>>,
     replaced_for: BTreeMap<(User, Handle<Expression>), Handle<Expression>>,
 }
@@ -93,10 +99,12 @@ impl<'a> Edit<'a> {
             function: Cow::Borrowed(function),
             outputs: Vec::new(),
             parameters: Vec::new(),
+            generated: Vec::new(),
             before_return: Block::new(),
             branches: Vec::new(),
             expressions: function.expressions.clone(),
             added: Vec::new(),
+            renamed: BTreeMap::new(),
             replaced: BTreeMap::new(),
             replaced_for: BTreeMap::new(),
         }
@@ -118,6 +126,12 @@ impl<'a> Edit<'a> {
     /// Gives an added value the name that writers print.
     pub(crate) fn name(&mut self, value: Handle<Expression>, name: String) {
         self.function.to_mut().named_expressions.insert(value, name);
+    }
+
+    /// Gives an old value another path, since it is another value once its operands have been replaced: no recipe that means
+    /// the old one may find it.
+    pub(crate) fn rename(&mut self, value: Handle<Expression>, path: String) {
+        self.renamed.insert(value.index(), path);
     }
 
     /// Makes a new input behind those of the function, and the value that it is, named by `path`.
@@ -152,6 +166,28 @@ impl<'a> Edit<'a> {
         value: Handle<Expression>,
     ) {
         self.parameters.push((name, ty, value));
+    }
+
+    /// Declares a texture that is generated, at the binding that it has.
+    pub(crate) fn add_texture(
+        &mut self,
+        name: String,
+        ty: TypeInner,
+        generated: Generated,
+    ) -> Handle<GlobalVariable> {
+        let (group, binding) = generated.binding;
+        let variable = GlobalVariable {
+            name: Some(name),
+            space: AddressSpace::Handle,
+            binding: Some(ResourceBinding { group, binding }),
+            ty: self.ty(ty),
+            init: None,
+            memory_decorations: naga::MemoryDecorations::empty(),
+        };
+        self.generated.push(generated);
+        self.module
+            .global_variables
+            .append(variable, Span::UNDEFINED)
     }
 
     /// Has statements done before the function returns, behind those that were given before. Values that they compute are
@@ -417,7 +453,9 @@ impl<'a> Edit<'a> {
         let mut ids = self.shader.ids.clone();
         ids[self.entry] = self.ids(&function, &sources);
         self.module.entry_points[self.entry].function = function;
-        let shader = Shader::changed(self.module, ids, self.shader.authors);
+        let mut generated = self.shader.generated.clone();
+        generated.append(&mut self.generated);
+        let shader = Shader::changed(self.module, ids, self.shader.authors, generated);
         match self.stage {
             Stage::Fragment => parameters::settle(interface::settle(shader)),
             Stage::Vertex => parameters::settle(shader),
@@ -540,13 +578,19 @@ impl<'a> Edit<'a> {
                     }),
                     Source::Value(at) => {
                         let first = !std::mem::replace(&mut seen[at], true);
+                        let is_free = |path: &str| base.iter().all(|id| id.path() != path);
+                        if let Some(path) = self.renamed.get(&at) {
+                            return match first && is_free(path) {
+                                true => ValueId::new(path.as_str(), 0),
+                                false => fresh(path),
+                            };
+                        }
                         match base.get(at) {
                             Some(id) if first => id.clone(),
                             Some(id) => fresh(id.path()),
                             None => {
                                 let path = &self.added[at - base.len()];
-                                let is_free = || base.iter().all(|id| id.path() != path);
-                                if first && is_free() {
+                                if first && is_free(path) {
                                     ValueId::new(path.as_str(), 0)
                                 } else {
                                     fresh(path)

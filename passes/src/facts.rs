@@ -19,6 +19,11 @@ pub struct Facts {
     /// What the scene states of numbers, vectors and matrices in buffers, by their paths: the bits of each component, a matrix
     /// column by column.
     pub fixed: BTreeMap<String, Vec<u32>>,
+    /// The samplers that repeat along both axes in every draw, by the names of their global variables.
+    pub repeating: BTreeSet<String>,
+    /// How many pixels the mesh's texture coordinates go over while they go from 0 to 1, at the facts' distance; `None` where
+    /// there are none.
+    pub pixels_per_coordinate: Option<f32>,
     /// For values and operands of theirs, how the one goes with the other: for each of the value's components.
     pub pairs: BTreeMap<(ValueId, ValueId), Vec<Moments>>,
 }

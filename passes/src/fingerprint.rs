@@ -33,7 +33,7 @@ impl Words {
         self.high ^= self.high >> 32;
     }
 
-    fn bytes16(self) -> [u8; 16] {
+    pub(crate) fn bytes16(self) -> [u8; 16] {
         let mut bytes = [0; 16];
         bytes[..8].copy_from_slice(&self.low.to_be_bytes());
         bytes[8..].copy_from_slice(&self.high.to_be_bytes());

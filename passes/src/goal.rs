@@ -56,6 +56,8 @@ pub struct Used {
     pub textures: u32,
     /// Bytes of those, with their MIP levels.
     pub texture_bytes: u64,
+    /// Bytes of the generated ones among them.
+    pub generated_bytes: u64,
 }
 
 impl Used {
@@ -212,6 +214,7 @@ mod tests {
             },
             textures,
             texture_bytes,
+            generated_bytes: 0,
         }
     }
 

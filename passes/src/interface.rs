@@ -329,7 +329,8 @@ pub(crate) fn alone(shader: &Shader) -> Shader {
     if let Some(vertex) = shader.index(Stage::Vertex) {
         let locations = locations_read(&module, fragment, &read);
         handed = return_only(&mut module, vertex, &locations);
-        let shader = Shader::changed(module, ids, shader.authors);
+        let generated = shader.generated.clone();
+        let shader = Shader::changed(module, ids, shader.authors, generated);
         let shader = match handed {
             // What computed the others goes.
             Some(_) => Edit::new(&shader, Stage::Vertex).finish(),
@@ -340,7 +341,7 @@ pub(crate) fn alone(shader: &Shader) -> Shader {
         take_only(&mut module, vertex, &read, None);
     }
     take_only(&mut module, fragment, &read, handed);
-    Shader::changed(module, ids, shader.authors)
+    Shader::changed(module, ids, shader.authors, shader.generated.clone())
 }
 
 /// What a stage reads of one of its arguments.
@@ -600,6 +601,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         mut module,
         ids,
         authors,
+        generated,
         ..
     } = shader;
     let at_new = |binding: &Option<Binding>| -> Option<Binding> {
@@ -672,7 +674,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         }
     }
     module.entry_points[vertex].function = function;
-    let shader = Shader::changed(module, ids, authors);
+    let shader = Shader::changed(module, ids, authors, generated);
     match dropped {
         // What computed it goes.
         true => Edit::new(&shader, Stage::Vertex).finish(),

@@ -13,6 +13,7 @@ pub mod facts;
 mod fingerprint;
 mod flow;
 mod fold;
+pub mod generated;
 pub mod goal;
 pub mod gradients;
 mod interface;
@@ -28,6 +29,7 @@ pub mod semantics;
 pub mod shader;
 mod slice;
 pub mod specialize;
+pub mod texture_collapse;
 pub mod texture_removal;
 pub mod to_parameter;
 pub mod vertex_motion;
@@ -35,6 +37,7 @@ pub mod vertex_motion;
 pub use cost::Work;
 pub use edit::{Edit, New};
 pub use facts::Facts;
+pub use generated::Generated;
 pub use goal::{Goal, Used};
 pub use normalize::{NormalizeError, normalize, normalize_stages};
 pub use rate::{Rate, Rates};
@@ -54,7 +57,11 @@ pub static PASSES: &[&dyn Pass] = &[
 /// Passes whose levels ask the host to fill a block of parameters: they are searched where it does.
 pub static WITH_PARAMETERS: &[&dyn Pass] = &[&to_parameter::ToParameter];
 
+/// Passes whose levels ask the host to bind textures that were made for them: they are searched where it does.
+pub static WITH_TEXTURES: &[&dyn Pass] = &[&texture_collapse::TextureCollapse];
+
 /// Every pass that there is.
 pub fn all_passes() -> impl Iterator<Item = &'static dyn Pass> {
-    PASSES.iter().chain(WITH_PARAMETERS).copied()
+    let asking = WITH_TEXTURES.iter().chain(WITH_PARAMETERS);
+    PASSES.iter().chain(asking).copied()
 }

@@ -20,7 +20,7 @@ use naga::{
     GlobalVariable, Handle, Module, ResourceBinding, ShaderStage, Span, Statement, StorageAccess,
     StructMember, Type, TypeInner,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The name of the parameter stage's entry point, unless the author has that name.
 const ENTRY: &str = "lod_parameters";
@@ -210,7 +210,7 @@ pub(crate) fn extended(
 }
 
 /// The names of a module, of its entry points' values and variables among them.
-fn names(module: &Module) -> BTreeSet<String> {
+pub(crate) fn names(module: &Module) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     found.extend(module.types.iter().filter_map(|(_, ty)| ty.name.clone()));
     let constants = module.constants.iter();
@@ -261,7 +261,7 @@ pub(crate) fn with_stage(shader: &Shader) -> Shader {
         incoming_ray_payload: None,
     });
     shader.ids.push(Vec::new());
-    Shader::changed(shader.module, shader.ids, shader.authors)
+    Shader::changed(shader.module, shader.ids, shader.authors, shader.generated)
 }
 
 /// A name for a member that no member has.
@@ -307,6 +307,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         mut module,
         mut ids,
         authors,
+        generated,
         ..
     } = shader;
     let mut entries = module.entry_points.iter();
@@ -315,16 +316,26 @@ pub(crate) fn settle(shader: Shader) -> Shader {
     if members.is_empty() {
         module.entry_points.remove(entry);
         ids.remove(entry);
-        // Nothing is behind the block's variables, so that all others keep their handles.
+        // Textures that were made after the block are behind its variables.
         let mut variables = Arena::new();
+        let mut renumbered = BTreeMap::new();
         for (variable, declared) in module.global_variables.iter() {
             if variable != block.read && variable != block.stored {
                 let span = module.global_variables.get_span(variable);
-                variables.append(declared.clone(), span);
+                renumbered.insert(variable, variables.append(declared.clone(), span));
             }
         }
         module.global_variables = variables;
-        return Shader::changed(module, ids, authors);
+        for point in &mut module.entry_points {
+            for (_, expression) in point.function.expressions.iter_mut() {
+                if let Expression::GlobalVariable(variable) = expression
+                    && let Some(now) = renumbered.get(variable)
+                {
+                    *variable = *now;
+                }
+            }
+        }
+        return Shader::changed(module, ids, authors, generated);
     }
     let ty = change(&mut module, block, members);
     for point in &mut module.entry_points {
@@ -350,7 +361,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         let components = order.iter().map(|old| stored.values[*old]).collect();
         function.expressions[value] = Expression::Compose { ty, components };
     }
-    let shader = Shader::changed(module, ids, authors);
+    let shader = Shader::changed(module, ids, authors, generated);
     match dropped {
         // What computed it goes.
         true => Edit::new(&shader, Stage::Parameter).finish(),

@@ -5,6 +5,7 @@
 
 use crate::cost::{FLAT_WEIGHT, INTERPOLATION_WEIGHT};
 use crate::flow::Findings;
+use crate::generated::Generated;
 use crate::interface::{self, Authors};
 use crate::operands::User;
 use crate::places::Places;
@@ -123,6 +124,8 @@ pub struct Shader {
     pub(crate) ids: Vec<Vec<ValueId>>,
     /// How much of what the stages hand over is the author's.
     pub(crate) authors: Authors,
+    /// The textures that passes have made, in the order in which they were made.
+    pub(crate) generated: Vec<Generated>,
     /// For each entry point, what was found out about its function when first asked for.
     known: Arc<Vec<Known>>,
 }
@@ -140,11 +143,16 @@ impl Shader {
     /// id of each expression.
     pub(crate) fn new(module: Module, ids: Vec<Vec<ValueId>>) -> Self {
         let authors = Authors::of(&module);
-        Self::changed(module, ids, authors)
+        Self::changed(module, ids, authors, Vec::new())
     }
 
     /// A variant of an author's shader.
-    pub(crate) fn changed(module: Module, ids: Vec<Vec<ValueId>>, authors: Authors) -> Self {
+    pub(crate) fn changed(
+        module: Module,
+        ids: Vec<Vec<ValueId>>,
+        authors: Authors,
+        generated: Vec<Generated>,
+    ) -> Self {
         let lengths = module
             .entry_points
             .iter()
@@ -159,6 +167,7 @@ impl Shader {
             module,
             ids,
             authors,
+            generated,
         }
     }
 
@@ -328,14 +337,15 @@ impl Shader {
 
     /// The identity of the shader: a hash of what its entry points do.
     pub fn fingerprint(&self) -> Fingerprint {
-        crate::fingerprint::of(&self.module)
+        crate::generated::told_apart(self, crate::fingerprint::of(&self.module))
     }
 
     /// The same of one stage's entry point; `None` when the shader lacks the stage.
     pub fn stage_fingerprint(&self, stage: Stage) -> Option<Fingerprint> {
         let function = self.function(stage)?;
         let declared = crate::fingerprint::Declared::of(&self.module);
-        Some(crate::fingerprint::of_function(&declared, function))
+        let of_function = crate::fingerprint::of_function(&declared, function);
+        Some(crate::generated::told_apart(self, of_function))
     }
 }
 

@@ -236,10 +236,18 @@ struct CompileArgs {
     /// A uniform, texture, value or function that is never folded, simplified or left out; as often as wanted
     #[arg(long, value_name = "NAME")]
     keep: Vec<String>,
-    /// What the host does for levels beyond drawing them: with parameters, it fills a block of them once a draw [default:
-    /// nothing but what the scene says]
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "parameters")]
+    /// What the host does for levels beyond drawing them: with parameters, it fills a block of them once a draw; with
+    /// textures, it binds those that are made for levels [default: nothing but what the scene says]
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "parameters,textures"
+    )]
     host: Vec<HostWord>,
+    /// How much memory the textures that are made for a level may take together, with their MIP levels
+    #[arg(long, value_name = "MIB")]
+    max_texture_memory: Option<u32>,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
@@ -253,6 +261,8 @@ struct CompileArgs {
 enum HostWord {
     /// It fills the parameter block
     Parameters,
+    /// It binds the textures that are made for levels
+    Textures,
 }
 
 /// Runs the tool. Exit code 0: done; 1: a check failed; 2: bad input or usage.
@@ -470,6 +480,8 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.output = arguments.output;
     request.bound = arguments.bound;
     request.parameters = arguments.host.contains(&HostWord::Parameters);
+    request.textures = arguments.host.contains(&HostWord::Textures);
+    request.max_texture_memory = arguments.max_texture_memory;
     request.form = arguments.form;
     request.target = arguments.target;
     request.transition = arguments.transition;

@@ -1,7 +1,7 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
-use super::{Files, Request, normal_form, relative};
-use crate::emit::{self, EmitLevel, Lock, Output, figure};
+use super::{Files, Request, normal_form, relative, textures};
+use crate::emit::{self, EmitLevel, Form, Lock, LockedGenerated, Output, figure};
 use crate::eval::draw::shade;
 use crate::eval::machine::MAX_ROUNDS;
 use crate::eval::program::{Program, Refused};
@@ -15,7 +15,8 @@ use crate::search::{
     texels_per_pixel,
 };
 use crate::{Diagnostic, Result};
-use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS};
+use lodc_passes::texture_collapse::MOST_TEXTURES;
+use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS, WITH_TEXTURES};
 use naga::Expression;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -101,6 +102,10 @@ impl Read {
         scene.reading = self.request.bound.unwrap_or(scene.reading);
         scene.goal = self.request.goal.unwrap_or(scene.goal);
         scene.host.parameters |= self.request.parameters;
+        scene.host.textures |= self.request.textures;
+        if let Some(mib) = self.request.max_texture_memory {
+            scene.host.most_texture_bytes = Some(u64::from(mib) << 20);
+        }
         Ready {
             request: self.request,
             source: self.source,
@@ -220,20 +225,26 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
     let transitions = ready.transitions(&vertex, &found, &levels, emission)?;
-    let lock = request.lock();
-    files.push((
-        lock.clone(),
-        ready
-            .lock((request, emission), &found, &levels, &transitions)
-            .to_toml()
-            .into_bytes(),
-    ));
-    let mut origin = ready.origin(request);
+    let textures = emit::generated_textures(&ready.source, &levels, emission.form)?;
+    let made = textures::make(&ready.scene, &textures)?;
+    let generated: Vec<LockedGenerated> = made.iter().map(|made| made.locked.clone()).collect();
+    files.extend(request.texture_files(made));
+    let lock = Lock {
+        generated: generated.clone(),
+        ..ready.lock((request, emission), &found, &levels, &transitions)
+    };
+    files.push((request.lock(), lock.to_toml().into_bytes()));
+    let mut origin = Origin {
+        generated,
+        ..ready.origin(request)
+    };
     let reached = ready.has_nothing_to_save(&found);
     origin
         .warnings
         .extend(reached.iter().map(|w| w.message.clone()));
     let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
+    let many = too_many(&ready.base, textures.len(), emission);
+    let visible: Vec<Box<Diagnostic>> = visible.into_iter().chain(many).collect();
     origin
         .warnings
         .extend(visible.iter().map(|w| w.message.clone()));
@@ -285,6 +296,18 @@ fn to_be_visible<'a>(
     (!names.is_empty()).then(|| {
         Diagnostic::warning(format!("the vertex stage of levels reads {} too", names.join(", ")))
             .with_note("a bind group layout that shows them to the fragment stage alone has to show them to the vertex stage as well")
+    })
+}
+
+/// Warns where the original's textures and those that were made for levels are more than a device has to bind at once.
+fn too_many(base: &Shader, made: usize, emission: Output) -> Option<Box<Diagnostic>> {
+    let all = base.sampled_textures() + made;
+    let at_once = emission.form != Form::Files && made > 0;
+    (at_once && all > MOST_TEXTURES).then(|| {
+        Diagnostic::warning(format!(
+            "all levels together sample {all} textures, and WebGPU's default limit is {MOST_TEXTURES}"
+        ))
+        .with_note("ask the device for more, or write one file a level: `--form files`")
     })
 }
 
@@ -385,6 +408,7 @@ impl Ready {
                 .collect(),
             inferences: self.inferred(),
             transitions: Vec::new(),
+            generated: Vec::new(),
         }
     }
 
@@ -422,6 +446,7 @@ impl Ready {
             .map(|level| &level.recipe)
             .chain([&found.exact.recipe])
             .flat_map(|recipe| averaged(&self.base, recipe))
+            .chain((found.levels.iter()).flat_map(|level| collapsed(&self.base, &level.shader)))
             .collect();
         Lock {
             source: emit::LockedSource {
@@ -475,10 +500,15 @@ impl Ready {
                     name: texture.name.clone(),
                     file: relative(folder, &file),
                     hash: self.hash_of(name),
-                    texels_per_pixel: texels_per_pixel(&self.scene, texture, self.scene.nearest)
-                        .map(figure),
+                    texels_per_pixel: texels_per_pixel(
+                        &self.scene,
+                        &texture.images,
+                        self.scene.nearest,
+                    )
+                    .map(figure),
                 })
                 .collect(),
+            generated: Vec::new(),
             output: emission,
             bound: self.scene.reading,
             goal: self.scene.goal,
@@ -508,6 +538,22 @@ impl Ready {
                 .collect(),
         }
     }
+}
+
+/// The textures of the author's that went into those that were made for a variant.
+fn collapsed(base: &Shader, variant: &Shader) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for made in variant.made() {
+        for read in &made.reads {
+            let variables = base.module().global_variables.iter();
+            let mut bound = variables.filter(|(_, variable)| {
+                let at = variable.binding.map(|at| (at.group, at.binding));
+                at == Some(read.binding)
+            });
+            names.extend(bound.next().and_then(|(_, variable)| variable.name.clone()));
+        }
+    }
+    names
 }
 
 /// The textures whose reads a recipe replaces by a mean.
@@ -574,6 +620,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let candidates: Vec<Candidate> = PASSES
         .iter()
         .chain(WITH_PARAMETERS)
+        .chain(WITH_TEXTURES)
         .flat_map(|pass| pass.candidates(&ready.base, &facts))
         .collect();
     let tried = search::try_each(&set, &ready.base, &candidates);

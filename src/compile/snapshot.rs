@@ -87,11 +87,12 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
         return Err(Diagnostic::error("an autoLOD is a number")
             .with_note("it counts halvings of scale on screen: 0 is the original"));
     }
-    let read = read_lock(request)?;
+    let mut read = read_lock(request)?;
+    let output = request.emission(read.lock.output);
+    read.levels = emit::settled(&read.source, &read.levels, output.form)?;
     let levels = &read.levels;
     // As the branching shader compares it: as an f32.
     let at = levels.partition_point(|level| level.autolod <= autolod as f32);
-    let target = request.target.unwrap_or(read.lock.output.target);
     let place = Request {
         output: asked.output.clone(),
         ..request.clone()
@@ -106,7 +107,13 @@ pub fn snapshot(asked: &SnapshotRequest) -> Result<Snapshot> {
         None => (&levels[..], at),
         Some(level) => (std::slice::from_ref(level), 1),
     };
-    let (frozen, files) = emit::one_level(&read.source, one, place_of_one, target, (&stem, &name))?;
+    let (frozen, files) = emit::one_level(
+        &read.source,
+        one,
+        place_of_one,
+        output.target,
+        (&stem, &name),
+    )?;
     let needs = needs(&frozen);
     let spared = self::needs(&read.source).into_iter();
     let spared = spared.filter(|need| !needs.iter().any(|have| have.name == need.name));

@@ -31,7 +31,8 @@ pub(crate) fn fragment_function(
     if let Some(result) = &mut function.result {
         result.binding = None;
     }
-    let keep = block.map_or(Vec::new(), |block| block.names().to_vec());
+    let mut keep = block.map_or(Vec::new(), |block| block.names().to_vec());
+    keep.extend(generated_names(level));
     let value = named(level, Stage::Fragment);
     written(body, (&mut module, function), (name, &keep), &value, names)
 }
@@ -157,6 +158,13 @@ pub(crate) fn gradient_function(
         Some(path_name(&level.shader, id.path()))
     };
     written(body, (&mut module, function), (name, &keep), &value, names)
+}
+
+/// The names of a level's generated textures.
+fn generated_names(level: &EmitLevel) -> impl Iterator<Item = &str> {
+    let generated = level.shader.generated().into_iter();
+    let variables = &level.shader.module().global_variables;
+    generated.filter_map(|(variable, _)| variables[variable].name.as_deref())
 }
 
 /// A level's module without its entry points, and the function of one of them, without the attributes of its arguments.

@@ -34,6 +34,8 @@ pub struct Lock {
     pub lighting: Option<LockedFile>,
     /// Every texture whose texels went into a number of a recipe.
     pub textures: Vec<LockedTexture>,
+    /// Every texture that was made for levels.
+    pub generated: Vec<LockedGenerated>,
     /// What is emitted.
     pub output: Output,
     /// How errors were held against the bound.
@@ -96,6 +98,24 @@ pub struct LockedTexture {
     pub hash: String,
     /// Texels per pixel where autoLOD is 0, when it is known.
     pub texels_per_pixel: Option<f64>,
+}
+
+/// A texture of a lock that was made for levels.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LockedGenerated {
+    /// The variable in the shader.
+    pub name: String,
+    /// The file, in the folder that has the lock's name.
+    pub file: String,
+    /// Its contents, as [`crate::front::hash`] gives them.
+    pub hash: String,
+    /// How its texels are stored, as WebGPU calls it.
+    pub format: String,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// How many MIP levels it has.
+    pub levels: u32,
 }
 
 /// A level of a lock.
@@ -209,6 +229,21 @@ impl Lock {
                     string(&texture.name),
                     string(&texture.file),
                     string(&texture.hash)
+                ));
+            }
+            line("]".to_owned());
+        }
+        if !self.generated.is_empty() {
+            line("generated = [".to_owned());
+            for texture in &self.generated {
+                let [width, height] = texture.size;
+                line(format!(
+                    "  {{ name = {}, file = {}, hash = {}, format = {}, size = [{width}, {height}], levels = {} }},",
+                    string(&texture.name),
+                    string(&texture.file),
+                    string(&texture.hash),
+                    string(&texture.format),
+                    texture.levels
                 ));
             }
             line("]".to_owned());
@@ -337,6 +372,7 @@ impl Lock {
             scene: raw.scene,
             lighting: raw.lighting,
             textures: raw.textures,
+            generated: raw.generated,
             output: raw.output,
             bound: raw.bound,
             goal: match raw.goal {
@@ -522,6 +558,8 @@ struct RawLock {
     #[serde(default)]
     textures: Vec<LockedTexture>,
     #[serde(default)]
+    generated: Vec<LockedGenerated>,
+    #[serde(default)]
     output: Output,
     #[serde(default)]
     bound: BoundReading,
@@ -659,6 +697,14 @@ mod tests {
                 file: "textures/grime.png".into(),
                 hash: hash(b"texture"),
                 texels_per_pixel: Some(0.1),
+            }],
+            generated: vec![LockedGenerated {
+                name: "loctx_0_grime".into(),
+                file: "loctx_0_grime.ktx2".into(),
+                hash: hash(b"made"),
+                format: "rgba8unorm".into(),
+                size: [256, 128],
+                levels: 9,
             }],
             output: Output {
                 form: Form::Uniform,

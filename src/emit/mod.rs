@@ -14,6 +14,7 @@ mod alone;
 mod body;
 mod composed;
 pub(crate) mod control;
+mod generated;
 mod level;
 mod lines;
 mod lock;
@@ -35,8 +36,12 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+use generated::Settled;
+pub(crate) use generated::settled;
+pub use generated::{GeneratedTexture, generated_textures};
 pub use lock::{
-    FORMAT, Lock, LockedFile, LockedLevel, LockedModules, LockedSource, LockedTexture, figure,
+    FORMAT, Lock, LockedFile, LockedGenerated, LockedLevel, LockedModules, LockedSource,
+    LockedTexture, figure,
 };
 pub use says::says;
 #[cfg(feature = "search")]
@@ -223,6 +228,7 @@ pub fn emit_as(
     check_thresholds(levels)?;
     check_band(output)?;
     let source = &*composed::composed(source)?;
+    let levels = &*Settled::new(source, levels, output.form).levels;
     let written = |stem: String, text: String| {
         let read = read_back(&text, source)?;
         written(source, &read, &text, output.target, &stem)
@@ -260,6 +266,7 @@ pub(crate) fn read(
     stem: &str,
 ) -> Result<Source> {
     let source = &*composed::composed(source)?;
+    let levels = &*Settled::new(source, levels, output.form).levels;
     let spliced = splice::splice(source, base, levels, output, stem)?;
     read_back(&spliced.text, source)
 }
@@ -284,6 +291,7 @@ fn written(
 }
 
 /// One level as a shader of its own, the original being at 0 and `levels[0]` at 1: as it is read back, and the files that it is.
+/// The levels are settled (see [`settled`]).
 /// `stem` begins the name of the lock, and `name` those of the files.
 ///
 /// # Errors

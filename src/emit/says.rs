@@ -46,6 +46,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut per_draw = Vec::new();
     let mut averaged = Vec::new();
     let mut branched = Vec::new();
+    let mut baked = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -62,6 +63,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
                 fitted.push(format!("{site} fitted to {}", short(operand.path())));
             }
             Some(("normal-to-roughness", _)) => widened.push(site),
+            Some(("same" | "levels" | "resampled" | "bake", _)) => baked.push(site),
             None if pass == "vertex-motion" => moved.push(site),
             None if candidate.choice == "exact" => per_draw.push(site),
             Some(("average", _)) => averaged.push(site),
@@ -94,6 +96,11 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             "{} removed, roughness widened",
             listed(&widened, "normal maps")
         ));
+    }
+    match &*baked {
+        [] => {}
+        [one] => clauses.push(format!("{one} baked into a texture")),
+        several => clauses.push(format!("{} baked into textures", listed(several, "values"))),
     }
     if !moved.is_empty() {
         clauses.push(format!("{} per vertex", listed(&moved, "values")));

@@ -290,10 +290,25 @@ pub fn decode_png(name: &str, bytes: &[u8], space: Space) -> Result<Image> {
 /// # Errors
 /// When the size is 0 or there are not `width * height` pixels.
 pub fn encode_png(width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
+    encoded_png([width, height], pixels, false)
+}
+
+/// The same, which says whether its colours are encoded as sRGB.
+///
+/// # Errors
+/// As [`encode_png`].
+pub(crate) fn encoded_png(
+    [width, height]: [u32; 2],
+    pixels: &[[u8; 4]],
+    is_srgb: bool,
+) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
+    if is_srgb {
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    }
     encoder
         .write_header()
         .and_then(|mut writer| {

@@ -9,6 +9,7 @@
 //! It does not know the search: values in, values out.
 
 pub mod draw;
+pub mod generated;
 pub mod image;
 pub mod parameters;
 pub mod raster;

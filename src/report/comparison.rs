@@ -84,6 +84,7 @@ impl ComparedAt {
                 vertex_operations: 0.0,
                 parameters: 0,
                 ratio_with_parameters: None,
+                ratio_with_textures: None,
                 texture_bytes: 0,
             }),
             ratio: measured.and_then(|both| {

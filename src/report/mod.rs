@@ -10,6 +10,7 @@ mod terminal;
 pub use comparison::{ComparedAt, Comparison};
 pub use terminal::{inspection, next, summary, table};
 
+use crate::emit::LockedGenerated;
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level, work_of};
 use lodc_passes::recipe::pass;
@@ -43,12 +44,44 @@ pub struct Report {
     pub levels: Vec<LevelReport>,
     /// Every variant that nothing beat in error and cost, distance by distance.
     pub frontier: Vec<FrontierReport>,
+    /// The textures that were made for levels.
+    pub generated: Vec<GeneratedReport>,
     /// What was left out, and why.
     pub left_out: Vec<String>,
     /// What should be known about this result.
     pub warnings: Vec<String>,
     /// What was inferred because the scene does not say it.
     pub inferences: Vec<String>,
+}
+
+/// A texture that was made for levels.
+#[derive(Clone, Debug, Serialize)]
+pub struct GeneratedReport {
+    /// Its variable.
+    pub name: String,
+    /// Its file, in the folder of such files.
+    pub file: String,
+    /// How its texels are stored, as WebGPU calls it.
+    pub format: String,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// How many MIP levels it has.
+    pub levels: u32,
+    /// The hash of the file.
+    pub hash: String,
+}
+
+impl From<LockedGenerated> for GeneratedReport {
+    fn from(locked: LockedGenerated) -> Self {
+        Self {
+            name: locked.name,
+            file: locked.file,
+            format: locked.format,
+            size: locked.size,
+            levels: locked.levels,
+            hash: locked.hash,
+        }
+    }
 }
 
 /// The exact tier: what every level below the original is made from.
@@ -213,6 +246,8 @@ pub struct CostReport {
     pub parameters: u32,
     /// What the ratio of the time would be if the host filled a block of parameters, where it does not and that is less.
     pub ratio_with_parameters: Option<f64>,
+    /// The same if the host bound textures that are made for levels.
+    pub ratio_with_textures: Option<f64>,
     /// Bytes of generated textures.
     pub texture_bytes: u64,
 }
@@ -292,6 +327,8 @@ pub struct Origin {
     pub inferences: Vec<String>,
     /// How each level takes over from the one before.
     pub transitions: Vec<Option<TransitionReport>>,
+    /// The textures that were made for levels.
+    pub generated: Vec<LockedGenerated>,
 }
 
 impl Report {
@@ -332,6 +369,7 @@ impl Report {
             inputs: origin.inputs,
             warnings: origin.warnings,
             inferences: origin.inferences,
+            generated: origin.generated.into_iter().map(Into::into).collect(),
         }
     }
 
@@ -399,7 +437,8 @@ fn level_report(
             vertex_operations: of_vertex(&level.shader),
             parameters: level.shader.parameters().len() as u32,
             ratio_with_parameters: level.with_parameters,
-            texture_bytes: 0,
+            ratio_with_textures: level.with_textures,
+            texture_bytes: level.used.generated_bytes,
         },
         mesh: MeshReport {
             file: None,

@@ -1,10 +1,12 @@
 //! The report as a person sees it in a terminal: a table of levels, a table of sites.
 
-use super::{Report, place_of};
+use super::{CostReport, Report, place_of};
 use crate::emit::{Form, Output};
 use crate::front::{Place, Source};
 use crate::search::Measured;
-use lodc_passes::{Candidate, Facts, Rates, Shader, Stage, WITH_PARAMETERS, texture_removal};
+use lodc_passes::{
+    Candidate, Facts, Rates, Shader, Stage, WITH_PARAMETERS, WITH_TEXTURES, texture_removal,
+};
 use naga::{Expression, Handle};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -82,7 +84,7 @@ pub fn summary(report: &Report) -> String {
     if report.bound == "paper" {
         out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
     }
-    out.push_str(&with_parameters(report));
+    out.push_str(&with_host(report));
     for what in report.left_out.iter().take(LEFT_OUT) {
         let _ = writeln!(out, "  left out: {what}");
     }
@@ -169,22 +171,27 @@ fn transitions(report: &Report) -> String {
     }
 }
 
-/// What levels would cost if the host filled a block of parameters, where that is a difference.
-fn with_parameters(report: &Report) -> String {
-    let levels = report.levels.iter().enumerate();
-    let costs: Vec<String> = levels
-        .filter_map(|(i, level)| {
-            let ratio = level.cost.ratio_with_parameters?;
-            Some(format!("{ratio:.2} of level {i}"))
-        })
-        .collect();
-    match costs.is_empty() {
-        true => String::new(),
-        false => format!(
-            "  with --host parameters, what is the same for a whole draw is computed once: cost {}\n",
-            costs.join(", ")
-        ),
-    }
+/// What levels would cost if the host did more for them, where that is a difference.
+fn with_host(report: &Report) -> String {
+    let line = |of: &dyn Fn(&CostReport) -> Option<f64>, says: &str| -> String {
+        let levels = report.levels.iter().enumerate();
+        let costs: Vec<String> = levels
+            .filter_map(|(i, level)| Some(format!("{:.2} of level {i}", of(&level.cost)?)))
+            .collect();
+        match costs.is_empty() {
+            true => String::new(),
+            false => format!("  with {says}: cost {}\n", costs.join(", ")),
+        }
+    };
+    let parameters = line(
+        &|cost| cost.ratio_with_parameters,
+        "--host parameters, what is the same for a whole draw is computed once",
+    );
+    let textures = line(
+        &|cost| cost.ratio_with_textures,
+        "--host textures, samples at the same coordinates become one",
+    );
+    parameters + &textures
 }
 
 /// What to do next, after the files have been written.
@@ -288,7 +295,7 @@ pub fn inspection(
             .passes
             .iter()
             .map(|(pass, count)| {
-                let mut asking = WITH_PARAMETERS.iter();
+                let mut asking = WITH_PARAMETERS.iter().chain(WITH_TEXTURES);
                 let mark = match asking.any(|asking| asking.name() == *pass) {
                     true => "*",
                     false => "",
@@ -325,7 +332,9 @@ pub fn inspection(
     let left = [false, true, true, true, true, false, false, true];
     let table = columns(&rows, &left);
     let asks = match table.contains("*") {
-        true => "  * asks the host to fill a block: --host parameters\n",
+        true => {
+            "  * asks the host to fill a block, or to bind new textures: --host parameters,textures\n"
+        }
         false => "",
     };
     format!("{table}  each change alone, at distance {distance:.2}; cost is estimated\n{asks}")

@@ -76,6 +76,10 @@ pub(super) struct LightingTable {
 pub(super) struct HostTable {
     #[serde(default)]
     pub(super) parameters: bool,
+    #[serde(default)]
+    pub(super) textures: bool,
+    /// In MiB.
+    pub(super) max_texture_memory: Option<u32>,
 }
 
 /// `[shader]`.

@@ -207,8 +207,11 @@ impl Writer<'_> {
             "how the bound is read; paper: as Liang's paper does",
         );
         self.line(
-            &format!("host = {{ parameters = {} }}", scene.host.parameters),
-            "whether it fills a block of parameters once a draw",
+            &format!(
+                "host = {{ parameters = {}, textures = {} }}",
+                scene.host.parameters, scene.host.textures
+            ),
+            "whether it fills a block of parameters once a draw, and binds textures made for levels",
         );
         self.line(
             &format!("pixels_per_degree = {:?}", scene.pixels_per_degree),

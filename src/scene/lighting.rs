@@ -11,6 +11,7 @@ use super::objects::Object;
 use super::textures::{self, Place, is_colour};
 use super::{Inference, InputFile, hash};
 use crate::eval::draw::{Format, Lighting, Plane};
+use crate::eval::generated::Store;
 use crate::eval::machine::Bindings;
 use crate::eval::program::Program;
 use crate::eval::raster::Frame;
@@ -98,6 +99,7 @@ impl SceneLighting {
             grid: 1,
             states: Arc::default(),
             shot: material.shot,
+            baked: Store::default(),
         }
     }
 }

@@ -35,8 +35,10 @@ use textures::SceneSampler;
 pub use textures::SceneTexture;
 
 use crate::eval::draw::{Blend, DrawState, Lit, state_of};
+use crate::eval::generated::Store;
 use crate::eval::machine::Bindings;
 use crate::eval::raster::{Attribute, Coverage, Frame};
+use crate::eval::texture::{Sampler, Wrap};
 use crate::front::{Source, VertexStage, hash, inputs, read_text};
 use crate::{Diagnostic, Result};
 use buffers::{Buffer, Said};
@@ -123,6 +125,8 @@ pub struct Scene {
     samplers: Vec<SceneSampler>,
     /// The bindings that are the same in every picture.
     constant: Bindings,
+    /// The textures that were made of its own.
+    pub(crate) baked: Store,
     samples: usize,
 }
 
@@ -131,6 +135,10 @@ pub struct Scene {
 pub struct Host {
     /// It fills the parameter block once a draw, and binds it.
     pub parameters: bool,
+    /// It binds the textures that are made for levels.
+    pub textures: bool,
+    /// How many bytes those of a level may have together, with their MIP levels.
+    pub most_texture_bytes: Option<u64>,
 }
 
 /// A file that a result depends on.
@@ -442,6 +450,7 @@ impl Scene {
             samples: samples.max(lit),
             lighting,
             constant: Bindings::new(),
+            baked: Store::default(),
             buffers,
         };
         if scene.uniform_samples() < scene.samples {
@@ -545,7 +554,22 @@ impl Scene {
                 distance,
                 draw,
             },
+            baked: self.baked.clone(),
         }
+    }
+
+    /// The samplers that repeat along both axes in every draw, by their names.
+    pub(crate) fn repeating(&self) -> BTreeSet<String> {
+        let repeats = |sampler: &Arc<Sampler>| sampler.wrap[..2] == [Wrap::Repeat; 2];
+        let all = self.samplers.iter();
+        all.filter(|sampler| sampler.samplers.iter().all(repeats))
+            .map(|sampler| sampler.name.clone())
+            .collect()
+    }
+
+    /// The resources that are the same in every picture.
+    pub(crate) fn constant(&self) -> &Bindings {
+        &self.constant
     }
 
     /// What lights a frame of this scene in a deferred scene: made for the coverage that its fragments are of.

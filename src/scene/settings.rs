@@ -229,6 +229,8 @@ impl Settings {
             },
             host: Host {
                 parameters: file.host.parameters,
+                textures: file.host.textures,
+                most_texture_bytes: file.host.max_texture_memory.map(|mib| u64::from(mib) << 20),
             },
             offsets: whole("offsets", &file.offsets, OFFSETS, 1, MOST_OFFSETS)? as usize,
             pixels_per_degree: number(

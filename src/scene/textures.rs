@@ -6,16 +6,17 @@ use super::file::{Entries, Node, Toml, suggest};
 use super::gltf::{MOST_BYTES, Model, add_input};
 use super::images::{ImageAnswer, ImageSource};
 use super::materials::{Factor, Role};
+use crate::eval::generated;
 use crate::eval::image::{Image, Space, decode};
 use crate::eval::machine::Resource;
 use crate::eval::texture::{Comparison, Dimension, Sampler, Texture, Wrap};
 use crate::front::names::{listed, words};
-use crate::front::{Source, similar_file};
+use crate::front::{Source, hash, similar_file};
 use crate::{Diagnostic, Result};
 use naga::{Expression, GlobalVariable, Handle, ImageClass, ImageDimension, ScalarKind, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -272,6 +273,27 @@ pub(super) fn resolve(
             None if of_model => false,
             None if matches!(answer, ImageAnswer::Pixels(_)) => false,
             None if answer == ImageAnswer::Dynamic => true,
+            None if let Some((file, bytes)) = generated_file(source, name) => {
+                let file = file.display().to_string();
+                found.inputs.push((file.clone(), hash(&bytes)));
+                let texture = generated::read(&file, &bytes)?;
+                if texture.dimension() != kind.dimension {
+                    return Err(Diagnostic::error(format!(
+                        "`{file}` is no image for the texture `{name}`"
+                    ))
+                    .with_note("make it again: run lodc on the shader that it belongs to"));
+                }
+                found.textures.push(SceneTexture {
+                    name: name.clone(),
+                    group: binding.group,
+                    binding: binding.binding,
+                    images: vec![Arc::new(texture)],
+                    dynamic: false,
+                    slopes: Vec::new(),
+                    files: Vec::new(),
+                });
+                continue;
+            }
             None => {
                 found
                     .warnings
@@ -380,6 +402,26 @@ pub(super) fn resolve(
         });
     }
     Ok(found)
+}
+
+/// The file of a texture that was made for the levels of a shader that lodc has written, and what is in it: in the folder
+/// `rock.lod` beside `rock.lod.wgsl` and `rock.snapshot.wgsl`.
+fn generated_file(source: &Source, name: &str) -> Option<(PathBuf, Vec<u8>)> {
+    let path = source
+        .path
+        .as_ref()
+        .filter(|_| name.starts_with("loctx_"))?;
+    let file = path.file_name()?.to_string_lossy();
+    let mut ends = [".lod", ".snapshot"]
+        .iter()
+        .filter_map(|end| file.find(end));
+    let stem = &file[..ends.next()?];
+    let folder = path.with_file_name(format!("{stem}.lod"));
+    generated::EXTENSIONS.iter().find_map(|extension| {
+        let file = folder.join(format!("{name}.{extension}"));
+        let bytes = std::fs::read(&file).ok()?;
+        Some((file, bytes))
+    })
 }
 
 /// How the materials of a model's draws sample the textures that a sampler is used with: as the first of them that

@@ -9,6 +9,7 @@ use super::levels::{Level, threshold};
 use super::parameters;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Samples, Stand};
+use super::textures;
 use crate::eval::program::Refused;
 use crate::scene::Split;
 use lodc_passes::{Recipe, Shader};
@@ -188,6 +189,15 @@ impl<'a> Checks<'a> {
                 with_parameters = Some(start.share(less.cost));
             }
         }
+        let mut with_textures = None;
+        if !self.stand.scene.host.textures
+            && let Some(made) = textures::collapsed(&shader, &search.facts(&shader), kept)
+            && let Ok(less) = start.measure(&made)
+            && less.cost < measured.cost
+            && less.strain <= 1.0
+        {
+            with_textures = Some(start.share(less.cost));
+        }
         Some(Level {
             autolod: threshold(self.stand.scene, distance),
             distance,
@@ -200,6 +210,7 @@ impl<'a> Checks<'a> {
             cost: start.share(measured.cost),
             time: measured.used.work.total() / original.used.work.total(),
             with_parameters,
+            with_textures,
             error_after: error_after(self.base, &recipe, search),
             recipe,
         })

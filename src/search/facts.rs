@@ -8,7 +8,7 @@ use crate::eval::machine::{Probe, Profile};
 use crate::eval::program::{Opacity, Program};
 use crate::eval::raster::vertex_profile;
 use crate::eval::texture::{Dimension, Texture};
-use crate::scene::{Scene, SceneTexture, Variation};
+use crate::scene::{Scene, Variation};
 use glam::{Vec2, Vec3};
 use lodc_passes::facts::{Moments, TextureFacts, ValueFacts};
 use lodc_passes::{Facts, Shader, Stage, autolod, op_removal};
@@ -38,12 +38,18 @@ impl SampleSet<'_> {
             textures: texture_facts(self.stand.scene, self.distance(), &opacity),
             dynamic: dynamic.map(|uniform| uniform.path.clone()).collect(),
             fixed: stated.collect(),
+            repeating: self.stand.scene.repeating(),
+            pixels_per_coordinate: coordinates_per_pixel(self.stand.scene, self.distance())
+                .map(|coordinates| coordinates.recip() as f32),
             ..Facts::default()
         };
         let compiled = Program::compile_with_pairs(shader.module(), entry, &probes, &pairs);
         let Ok(programs) = compiled.and_then(|program| Programs::with(shader, program)) else {
             return facts;
         };
+        facts
+            .textures
+            .extend(self.generated_facts(shader, &programs, &opacity));
         let program = &programs.fragment;
         let profiles: Vec<_> = self
             .frames
@@ -163,6 +169,30 @@ fn seen_of<'a>(
     (fact.count > 0).then_some(fact)
 }
 
+impl SampleSet<'_> {
+    /// What is known of the textures that were made for a shader, by their names.
+    fn generated_facts(
+        &self,
+        shader: &Shader,
+        programs: &Programs,
+        opacity: &Opacity,
+    ) -> BTreeMap<String, TextureFacts> {
+        let scene = self.stand.scene;
+        let baked = programs.generated.baked(scene.constant(), &scene.baked);
+        let generated = shader.generated().into_iter().zip(baked);
+        generated
+            .filter_map(|((variable, generated), baked)| {
+                let name = shader.module().global_variables[variable].name.clone()?;
+                let images = [baked.texture];
+                let level = texels_per_pixel(scene, &images, self.distance()).unwrap_or(1.0);
+                let weighed = opacity.textures.contains(&generated.binding);
+                let [image] = images;
+                Some((name, image.facts(level.log2().max(0.0) as f32, weighed)))
+            })
+            .collect()
+    }
+}
+
 /// What was seen of values, each fragment weighed by its share of the picture, but of what their opacity is made of, which
 /// is worth as much whatever it is: where that is so, it is as the second profile has it.
 fn with_opacity(mut profile: Profile, opacity_profile: Profile, opacity: &Opacity) -> Profile {
@@ -196,7 +226,7 @@ fn texture_facts(
     known
         .map(|texture| {
             let weighed = opacity.textures.contains(&(texture.group, texture.binding));
-            let level = texels_per_pixel(scene, texture, distance)
+            let level = texels_per_pixel(scene, &texture.images, distance)
                 .unwrap_or(1.0)
                 .log2();
             (
@@ -214,19 +244,19 @@ fn texture_facts(
         .collect()
 }
 
-/// Texels of a texture to a pixel at a distance, along an edge, when it is mapped by the mesh's own texture
-/// coordinates: the mean over the mesh's area. `None` for a texture or a mesh that has no such coordinates.
+/// Texels of a texture, with its images, to a pixel at a distance, along an edge, when it is mapped by the mesh's own
+/// texture coordinates: the mean over the mesh's area. `None` for a texture or a mesh that has no such coordinates.
 pub(crate) fn texels_per_pixel(
     scene: &Scene,
-    texture: &SceneTexture,
+    images: &[Arc<Texture>],
     distance: f64,
 ) -> Option<f64> {
     let flat = |image: &Arc<Texture>| image.dimension() == Dimension::D2;
-    if !texture.images.iter().all(flat) {
+    if !images.iter().all(flat) {
         return None;
     }
     mapped_per_pixel(scene, distance, &|draw| {
-        let image = texture.images.get(draw).or(texture.images.last())?;
+        let image = images.get(draw).or(images.last())?;
         let [width, height, _] = image.size(0);
         Some([width, height])
     })

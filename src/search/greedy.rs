@@ -16,7 +16,9 @@ use super::interval::Interval;
 use super::parameters;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
-use lodc_passes::{Candidate, Fingerprint, PASSES, Recipe, Shader, WITH_PARAMETERS, recipe};
+use lodc_passes::{
+    Candidate, Fingerprint, PASSES, Recipe, Shader, WITH_PARAMETERS, WITH_TEXTURES, recipe,
+};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -184,7 +186,9 @@ impl Descent<'_, '_> {
             // What is exact was done before, or is not wanted.
             let host = self.interval.start().stand.scene.host;
             let asking = WITH_PARAMETERS.iter().filter(|_| host.parameters);
-            let passes = PASSES.iter().filter(|pass| !pass.is_exact()).chain(asking);
+            let making = WITH_TEXTURES.iter().filter(|_| host.textures);
+            let passes = PASSES.iter().filter(|pass| !pass.is_exact());
+            let passes = passes.chain(asking).chain(making);
             let kept = self.guard.kept();
             let candidates: Vec<Candidate> = passes
                 .filter(|pass| kept.admits(pass.name()))

@@ -51,6 +51,8 @@ pub struct Level {
     /// What `cost` would be with all that is the same for a whole draw moved to parameters, where the host does not allow
     /// that and it would be less.
     pub with_parameters: Option<f64>,
+    /// The same with textures made for levels.
+    pub with_textures: Option<f64>,
     /// For each step of the recipe, the RMSE after it, over the samples that the search looked at.
     pub error_after: Vec<f64>,
 }
@@ -71,6 +73,7 @@ impl Level {
             cost: 1.0,
             time: 1.0,
             with_parameters: None,
+            with_textures: None,
             error_after: Vec::new(),
         }
     }

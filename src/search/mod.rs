@@ -29,6 +29,7 @@ pub mod levels;
 mod parameters;
 mod programs;
 pub mod samples;
+mod textures;
 mod trajectory;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};

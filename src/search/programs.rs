@@ -1,6 +1,7 @@
 //! The programs that draw a variant: of its fragment stage, of its vertex stage where it has one of its own, and of its
 //! parameter stage.
 
+use crate::eval::generated::GeneratedTextures;
 use crate::eval::parameters::ParameterStage;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::Frame;
@@ -22,6 +23,8 @@ pub struct Programs {
     pub(super) parameters: Option<ParameterStage>,
     /// Group and binding of the textures that they read, where that is known.
     pub(super) textures: BTreeSet<(u32, u32)>,
+    /// The textures that were made for it.
+    pub(super) generated: GeneratedTextures,
 }
 
 impl Programs {
@@ -46,6 +49,7 @@ impl Programs {
             handing_over: handing_over.unwrap_or(0.0),
             parameters: ParameterStage::of(shader)?,
             textures: active_textures(shader),
+            generated: GeneratedTextures::of(shader)?,
         })
     }
 
@@ -58,6 +62,7 @@ impl Programs {
             handing_over: 0.0,
             parameters: None,
             textures: BTreeSet::new(),
+            generated: GeneratedTextures::default(),
         }
     }
 
@@ -70,14 +75,19 @@ impl Programs {
         }
     }
 
-    /// A frame with the parameters bound, and the work of their stage for all of its draws, in full-rate scalar operations.
+    /// A frame with the parameters and the generated textures bound, and the work of the parameter stage for all of its
+    /// draws, in full-rate scalar operations. What makes a texture works once and for all, so that it is not in it.
     pub(super) fn bound<'f>(&self, frame: &'f Frame) -> (Cow<'f, Frame>, f64) {
-        let Some(parameters) = &self.parameters else {
+        if self.parameters.is_none() && self.generated.is_empty() {
             return (Cow::Borrowed(frame), 0.0);
-        };
+        }
         let mut frame = frame.clone();
-        let draws = frame.mesh.draws().len();
-        let work = parameters.bind(&mut frame.bindings, draws);
+        let mut work = 0.0;
+        if let Some(parameters) = &self.parameters {
+            let draws = frame.mesh.draws().len();
+            work = parameters.bind(&mut frame.bindings, draws);
+        }
+        self.generated.bind(&mut frame.bindings, &frame.baked);
         (Cow::Owned(frame), work)
     }
 }

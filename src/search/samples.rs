@@ -4,6 +4,7 @@
 use super::error::{Details, ErrorFigures, ErrorSum};
 use super::frame::{Executed, Part, Pen, Rasterised, shown};
 use super::programs::{self, Programs};
+use crate::eval::generated::Baked;
 use crate::eval::program::{Program, Refused};
 use crate::scene::{
     Scene, Split,
@@ -386,9 +387,12 @@ impl<'a> SampleSet<'a> {
     fn judge(&self, (details, used): &(Details, Used)) -> Measured {
         let figures = self.figures_of(details);
         let added = details.error.square() - self.original.0.error.square();
+        let most = self.stand.scene.host.most_texture_bytes;
+        let too_large = most.is_some_and(|most| used.generated_bytes > most);
         Measured {
             error: details.error,
             strain: match self.whole {
+                _ if too_large => f64::INFINITY,
                 true => figures.strain(),
                 false => figures.strain_of_means(),
             },
@@ -422,10 +426,14 @@ impl<'a> SampleSet<'a> {
         let mut work = all.work * (1.0 / all.fragments.max(1) as f64);
         work.moved = programs.handing_over + all.elsewhere / all.drawn.max(1) as f64;
         let frames = results.into_iter().map(|(view, (error, _))| (view, error));
+        let scene = self.stand.scene;
+        let made = programs.generated.baked(scene.constant(), &scene.baked);
+        let made: u64 = made.iter().map(Baked::bytes).sum();
         let used = Used {
             work,
             textures: programs.textures.len() as u32,
-            texture_bytes: self.stand.scene.texture_bytes(&programs.textures),
+            texture_bytes: scene.texture_bytes(&programs.textures) + made,
+            generated_bytes: made,
         };
         (Details::new(frames), used)
     }

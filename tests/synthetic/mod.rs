@@ -8,7 +8,10 @@ use naga::TypeInner;
 /// every texture has an image of three MIP levels, and every
 /// value that may be fitted to an operand falls as that rises.
 pub(crate) fn facts(shader: &Shader) -> Facts {
-    let mut facts = Facts::default();
+    let mut facts = Facts {
+        pixels_per_coordinate: Some(100.0),
+        ..Facts::default()
+    };
     for stage in [Stage::Vertex, Stage::Fragment] {
         let Some(function) = shader.function(stage) else {
             continue;

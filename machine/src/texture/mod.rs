@@ -6,7 +6,7 @@ mod mip;
 mod placeholder;
 mod sample;
 
-pub use sample::{Detail, Floats, Integers, Request};
+pub use sample::{Detail, Floats, Integers, Request, cube_direction};
 
 use lodc_passes::facts::TextureFacts;
 use std::fmt;
@@ -180,6 +180,21 @@ impl Texture {
             dimension,
             levels: vec![level],
         })
+    }
+
+    /// A texture of levels that are there, finest first.
+    ///
+    /// # Panics
+    /// When there is none, or one has not as many texels as its size says, or none.
+    pub fn of_levels(dimension: Dimension, levels: Vec<Level>) -> Self {
+        assert!(!levels.is_empty(), "a texture has a level");
+        for level in &levels {
+            let [width, height, layers] =
+                [level.width, level.height, level.layers].map(|edge| edge as usize);
+            let count = width * height * layers;
+            assert!(count > 0 && count == level.texels.len(), "as its size says");
+        }
+        Self { dimension, levels }
     }
 
     /// The same texture with all MIP levels, each the box filter of the one before.

@@ -743,8 +743,8 @@ impl Face {
     }
 }
 
-/// The point of the unit cube's surface at coordinates of a face.
-pub(super) fn cube_direction(face: usize, s: f32, t: f32) -> [f32; 3] {
+/// The point of the unit cube's surface at coordinates of a face, both 0..1; faces are in the order of [`Dimension::Cube`].
+pub fn cube_direction(face: usize, s: f32, t: f32) -> [f32; 3] {
     let (s, t) = (2.0 * s - 1.0, 2.0 * t - 1.0);
     match face {
         0 => [1.0, -t, -s],

@@ -321,6 +321,7 @@ struct Outputs { @location(0) albedo: vec4f, @location(2) normal: vec2f }
             grid,
             states: Arc::default(),
             shot: Default::default(),
+            baked: Default::default(),
         }
     }
 

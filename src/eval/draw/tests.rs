@@ -189,6 +189,7 @@ fn frame(mesh: Mesh, size: u32, image: Image) -> Frame {
         grid: 1,
         states: Arc::default(),
         shot: Default::default(),
+        baked: Default::default(),
     }
 }
 

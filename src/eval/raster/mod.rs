@@ -23,6 +23,7 @@ pub(crate) use quads::Quad;
 pub(crate) use vertices::{attribute, hand_over_the_same, profile as vertex_profile};
 
 use super::draw::{Blend, DrawState, state_of};
+use super::generated::Store;
 use super::lane::{LANES, Mask, Words};
 use super::machine::{Bindings, Profile, Recall};
 use super::program::{Program, Slot};
@@ -82,6 +83,8 @@ pub struct Frame {
     pub states: Arc<[DrawState]>,
     /// What it is a picture of.
     pub shot: Shot,
+    /// The textures that were made of its own.
+    pub baked: Store,
 }
 
 /// What a frame shows before it is shaded: fragments in a fixed order, with the inputs of the fragment program.

@@ -1,0 +1,395 @@
+//! texture-collapse: texture samples and what is done to them become one sample of a texture that is made beforehand.
+//!
+//! Precondition. The site is a float or a vector of them of the fragment stage that is computed of samples of known
+//! textures and of constants alone. All samples have the same sampler and choose their level of detail in the same way, at
+//! coordinates that the candidate names, its root, or at ones that repeat a whole number of times when the root goes
+//! from 0 to 1.
+//!
+//! Effect. One of the samples that nothing else needs reads the new texture at the root instead, and the site is what it
+//! returns. The texture is bound at the first free binding of the group of the textures that went into it. How its texels
+//! are computed is kept beside the variant (see [`crate::generated`]); uniforms that the scene fixes are numbers by then
+//! (see [`crate::specialize`]).
+//! - `same <root>`: all samples are at the root, and the value is a linear function of them, so that filtering before and
+//!   after gives the same.
+//! - `levels <root>`: all are at the root, but the value is no linear function. Each MIP level is computed from that level
+//!   of the sources: texel for texel it is the same, and what is filtered between texels differs.
+//! - `resampled <root>`: some are at an affine function of the root, by which they repeat along both axes. They are resampled
+//!   into the resolution of the finest of them.
+//!
+//! - `bake <root> <edge>`: the value is computed of texture coordinates and constants alone, without a texture, such as
+//!   noise. Each texel of the finest level is the mean of 4 x 4 points, and there are as many along each edge as the number
+//!   behind the root says. Here a new sample comes, so that accesses may rise by one.
+//!
+//! Error. `same` has that of the texture's format. The others have what the picture shows: it is measured. But for `bake`, accesses never
+//! increase, since at least one sample goes for the new one.
+//!
+//! Declines.
+//! - A texture that the facts do not know, because it may hold anything, and one that has another image in each draw.
+//! - Coordinates without a common period, and coordinates that are used for more than sampling.
+//! - What is in a branch that may be there for a hole in its domain, and what each round of a loop computes anew.
+//! - Where other users still need all of the samples, so that there would be one more.
+//! - `bake` of little work, of coordinates outside of 0..1, and in branches, where there is no implicit level of detail.
+//! - Where the stage would sample more textures than WebGPU's default limit.
+//!
+//! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail", 2003, section 2.1
+//! (texture collapse, figure 3) and 3.1 (names of generated textures); Brian Guenter, Todd Knoblock, Erik Ruf,
+//! "Specializing Shaders", 1995 (values of coordinates, computed beforehand).
+
+mod plan;
+mod seen;
+
+use crate::cost::{self, SAMPLE_WEIGHT};
+use crate::facts::TextureFacts;
+use crate::flow::{Flow, Value};
+use crate::operands;
+use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
+use crate::shader::{Shader, Stage, ValueId};
+use crate::{Facts, Work};
+use naga::Expression;
+use plan::{MOST_EDGE, Plan, is_operation};
+use seen::{Of, Sample, sample, seen_from};
+
+/// The stage whose samples are collapsed.
+const STAGE: Stage = Stage::Fragment;
+
+/// How many textures a stage may sample: WebGPU's default `maxSampledTexturesPerShaderStage`.
+pub const MOST_TEXTURES: usize = 16;
+
+/// The pass.
+pub struct TextureCollapse;
+
+/// How a value is collapsed: the words of this pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Same,
+    Levels,
+    Resampled,
+    /// With so many texels along each edge.
+    Bake(u32),
+}
+
+impl Kind {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Same => "same",
+            Self::Levels => "levels",
+            Self::Resampled => "resampled",
+            Self::Bake(_) => "bake",
+        }
+    }
+
+    /// The choice of this kind, with the id of a root.
+    fn choice(self, root: &ValueId) -> String {
+        match self {
+            Self::Bake(edge) => format!("bake {root} {edge}"),
+            _ => format!("{} {root}", self.word()),
+        }
+    }
+
+    /// A choice: the kind, and the id of the root behind it.
+    fn parse(choice: &str) -> Result<(Self, ValueId), Declined> {
+        let words: Vec<&str> = choice.split(' ').collect();
+        let kind = match words[..] {
+            ["same", root] => Some((Self::Same, root)),
+            ["levels", root] => Some((Self::Levels, root)),
+            ["resampled", root] => Some((Self::Resampled, root)),
+            ["bake", root, edge] => edge.parse().ok().map(|edge| (Self::Bake(edge), root)),
+            _ => None,
+        };
+        kind.map(|(kind, root)| (kind, ValueId::from(root)))
+            .ok_or_else(|| Declined(format!("texture-collapse has no choice `{choice}`")))
+    }
+}
+
+impl Pass for TextureCollapse {
+    fn name(&self) -> &'static str {
+        "texture-collapse"
+    }
+
+    fn summary(&self) -> &'static str {
+        "texture samples and what is done to them become one sample of a new texture"
+    }
+
+    fn class(&self, candidate: &Candidate) -> Class {
+        match Kind::parse(&candidate.choice) {
+            Ok((Kind::Same, _)) => Class::Lossless,
+            Ok((Kind::Levels | Kind::Resampled, _)) => Class::ResolutionLossless,
+            Ok((Kind::Bake(_), _)) | Err(_) => Class::Lossy,
+        }
+    }
+
+    fn consider(&self, shader: &Shader, facts: &Facts) -> Vec<Considered> {
+        match Flow::new(shader, STAGE) {
+            Some(flow) => consider(&flow, facts),
+            None => Vec::new(),
+        }
+    }
+
+    fn applies(&self, shader: &Shader, candidate: &Candidate) -> Result<(), Declined> {
+        let flow = stage(shader, candidate)?;
+        Plan::of_candidate(&flow, candidate).map(drop)
+    }
+
+    fn apply(&self, shader: &Shader, candidate: &Candidate) -> Shader {
+        let made = stage(shader, candidate)
+            .and_then(|flow| Ok(Plan::of_candidate(&flow, candidate)?.make(&flow)));
+        match made {
+            Ok(made) => made,
+            Err(declined) => panic!("{candidate} was applied, but {declined}"),
+        }
+    }
+}
+
+/// Whether all samples of a candidate are at its root, so that each texel of the new texture is one of the sources'.
+pub fn is_texel_by_texel(candidate: &Candidate) -> bool {
+    let kind = Kind::parse(&candidate.choice);
+    candidate.pass == TextureCollapse.name() && matches!(kind, Ok((Kind::Same | Kind::Levels, _)))
+}
+
+fn stage<'a>(shader: &'a Shader, candidate: &Candidate) -> Result<Flow<'a>, Declined> {
+    candidate.baked(0)?;
+    Flow::new(shader, STAGE).ok_or_else(|| Declined("there is no fragment stage".into()))
+}
+
+fn find(flow: &Flow, id: &ValueId) -> Result<Value, Declined> {
+    match flow.shader.find(id) {
+        Some((STAGE, value)) => Ok(value),
+        Some(_) => Err(Declined(
+            "only samples of the fragment stage are collapsed".into(),
+        )),
+        None => Err(Declined(format!("there is no value `{}`", id.path()))),
+    }
+}
+
+/// All that this pass thinks of.
+fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
+    let values: Vec<Value> = flow.function.expressions.iter().map(|(v, _)| v).collect();
+    let reads: Vec<(Value, Sample)> = values
+        .iter()
+        .filter_map(|value| Some((*value, sample(flow, *value)?)))
+        .collect();
+    let mut roots: Vec<Value> = reads.iter().map(|(_, read)| read.coordinate).collect();
+    roots.sort_unstable();
+    roots.dedup();
+    let mut found: Vec<(Value, Considered)> = Vec::new();
+    // For each value, the root that makes texels of it.
+    let mut root_of: Vec<Option<Value>> = vec![None; values.len()];
+    for root in roots {
+        let of = seen_from(flow, root);
+        for &site in &values {
+            let is_texels = matches!(of[site.index()], Of::Texels { .. });
+            if is_texels {
+                root_of[site.index()].get_or_insert(root);
+            }
+        }
+        for site in largest(flow, &of, |of| matches!(of, Of::Texels { .. })) {
+            let plan = Plan::new(flow, (site, root), &of);
+            let considered = match &plan {
+                Ok(plan) => Some((plan.kind, known(flow, plan, facts))),
+                // A sample that nothing is done to is not worth a word.
+                Err(_) if sample(flow, site).is_some() => None,
+                Err(why) => Some((Kind::Same, Err(why.clone()))),
+            };
+            if let Some((kind, verdict)) = considered {
+                let id = flow.id(root);
+                let choice = match &verdict {
+                    Ok(()) => kind.choice(id),
+                    Err(_) => kind.word().to_owned(),
+                };
+                found.push((site, candidate(flow, site, choice, verdict.err())));
+            }
+        }
+    }
+    found.extend(apart(flow, &root_of));
+    found.extend(procedural(flow, facts));
+    found.sort_by(|(a, one), (b, other)| (a, &one.candidate).cmp(&(b, &other.candidate)));
+    found.dedup();
+    found
+        .into_iter()
+        .map(|(_, considered)| considered)
+        .collect()
+}
+
+fn candidate(flow: &Flow, site: Value, choice: String, declined: Option<Declined>) -> Considered {
+    Considered {
+        candidate: Candidate {
+            pass: TextureCollapse.name().into(),
+            site: flow.id(site).clone(),
+            choice,
+            value: Vec::new(),
+        },
+        declined,
+    }
+}
+
+/// The largest floats that are seen so: those that something else uses.
+fn largest(flow: &Flow, of: &[Of], is: fn(&Of) -> bool) -> Vec<Value> {
+    let values: Vec<Value> = flow.function.expressions.iter().map(|(v, _)| v).collect();
+    let mut absorbed = vec![false; values.len()];
+    let mut found = Vec::new();
+    for &value in values.iter().rev() {
+        if !is(&of[value.index()]) {
+            continue;
+        }
+        let mut users = flow.users(value).peekable();
+        let inner = !flow.is_stated(value)
+            && users.peek().is_some()
+            && users.all(|user| absorbed[user.index()]);
+        let is_float = flow.floats(value).is_some();
+        absorbed[value.index()] = inner || is_float;
+        if is_float && !inner {
+            found.push(part_of(flow, value, of, is));
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// The vector that a value is no more than a part of.
+fn part_of(flow: &Flow, mut value: Value, of: &[Of], is: fn(&Of) -> bool) -> Value {
+    loop {
+        let whole = match flow.function.expressions[value] {
+            Expression::AccessIndex { base, .. } => base,
+            Expression::Swizzle { vector, .. } => vector,
+            _ => return value,
+        };
+        if flow.floats(whole).is_none() || !is(&of[whole.index()]) {
+            return value;
+        }
+        value = whole;
+    }
+}
+
+/// Declines what is not known of the textures of a plan, or asks for too many.
+fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
+    for name in plan.textures(flow) {
+        match facts.textures.get(name) {
+            None => {
+                return Err(Declined(format!(
+                    "`{name}` is dynamic: it may hold anything"
+                )));
+            }
+            Some(TextureFacts { mean, .. }) if mean.is_empty() => {
+                return Err(Declined(format!("draws have different images of `{name}`")));
+            }
+            Some(_) => {}
+        }
+    }
+    if plan.kind == Kind::Resampled {
+        let sampler = plan
+            .samples
+            .first()
+            .and_then(|(_, read)| flow.global(read.sampler));
+        let name = sampler.and_then(|sampler| flow.module.global_variables[sampler].name.as_ref());
+        if !name.is_some_and(|name| facts.repeating.contains(name)) {
+            return Err(Declined("its sampler does not repeat".into()));
+        }
+    }
+    has_room(flow, plan)
+}
+
+/// Declines what would make a stage sample too many textures.
+fn has_room(flow: &Flow, plan: &Plan<'_>) -> Result<(), Declined> {
+    let sampled = plan.make(flow).sampled_textures();
+    if sampled > MOST_TEXTURES && sampled > flow.shader.sampled_textures() {
+        return Err(Declined(format!(
+            "the stage would sample {sampled} textures, and WebGPU's default limit is {MOST_TEXTURES}"
+        )));
+    }
+    Ok(())
+}
+
+/// Values of samples that are at unrelated coordinates.
+fn apart(flow: &Flow, root_of: &[Option<Value>]) -> Vec<(Value, Considered)> {
+    let values = flow.function.expressions.iter().map(|(value, _)| value);
+    values
+        .filter(|value| root_of[value.index()].is_none() && flow.floats(*value).is_some())
+        .filter(|value| is_operation(flow, *value))
+        .filter_map(|value| {
+            let (mut roots, mut others) = (Vec::new(), false);
+            operands::each(&flow.function.expressions[value], |operand| {
+                match root_of[operand.index()] {
+                    Some(root) => roots.push(root),
+                    None => others |= !flow.is_constant(operand),
+                }
+            });
+            roots.sort_unstable();
+            roots.dedup();
+            let why = "its textures are read at coordinates without a common period";
+            (roots.len() > 1 && !others).then(|| {
+                let declined = Some(Declined(why.into()));
+                (
+                    value,
+                    candidate(flow, value, Kind::Resampled.word().into(), declined),
+                )
+            })
+        })
+        .collect()
+}
+
+/// The largest values of texture coordinates alone that are worth a sample, with the edge that gives a texel a pixel, and
+/// with half of it.
+fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
+    let Ok(types) = cost::types(flow.module, flow.function) else {
+        return Vec::new();
+    };
+    let works: Vec<Work> = cost::of_expressions(flow.module, &flow.function.expressions, &types);
+    let values = flow.function.expressions.iter().map(|(value, _)| value);
+    let roots = values.filter(|v| flow.input(*v).is_some() && flow.floats(*v) == Some(2));
+    let mut found = Vec::new();
+    for root in roots {
+        let of = seen_from(flow, root);
+        for site in largest(flow, &of, |of| *of == Of::Function) {
+            let edge = facts.pixels_per_coordinate.map_or(LEAST_EDGE, |pixels| {
+                let pixels = pixels.clamp(1.0, MOST_EDGE as f32) as u32;
+                pixels.next_power_of_two().clamp(LEAST_EDGE, MOST_EDGE)
+            });
+            let plan = Plan::procedural(flow, (site, root), &of, edge);
+            if plan
+                .as_ref()
+                .is_ok_and(|plan| plan.work(&works) < SAMPLE_WEIGHT)
+                || !is_operation(flow, site)
+            {
+                continue;
+            }
+            match plan.and_then(|plan| may_be_baked(flow, (&plan, root), facts)) {
+                Ok(()) => found.extend([edge, edge / 2].map(|edge| {
+                    let choice = Kind::Bake(edge).choice(flow.id(root));
+                    (site, candidate(flow, site, choice, None))
+                })),
+                Err(why) => {
+                    let choice = Kind::Bake(edge).word().to_owned();
+                    found.push((site, candidate(flow, site, choice, Some(why))));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The shortest edge of a texture of a value without one, in texels; half of it is tried too.
+const LEAST_EDGE: u32 = 16;
+
+/// How far beyond 0..1 coordinates may go, as interpolation rounds them.
+const BEYOND: f32 = 1e-3;
+
+/// Declines a value whose coordinates leave the texture, or of which it is not known how large it is on the screen.
+fn may_be_baked(
+    flow: &Flow,
+    (plan, root): (&Plan<'_>, Value),
+    facts: &Facts,
+) -> Result<(), Declined> {
+    let no = |why: &str| Err(Declined(why.into()));
+    if facts.pixels_per_coordinate.is_none() {
+        return no("it is not known how large its coordinates are on the screen");
+    }
+    let inside = facts.values.get(flow.id(root)).is_some_and(|seen| {
+        let least = seen.min.iter().all(|min| *min >= -BEYOND);
+        least && seen.max.iter().all(|max| *max <= 1.0 + BEYOND)
+    });
+    if !inside {
+        return no("its coordinates were seen outside of 0..1, or not at all");
+    }
+    has_room(flow, plan)
+}

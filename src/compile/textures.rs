@@ -1,0 +1,121 @@
+//! The files of the textures that are made for levels.
+
+use super::{Files, Relocked, Request};
+use crate::emit::{GeneratedTexture, LockedGenerated};
+use crate::{Diagnostic, Result, front};
+use std::path::PathBuf;
+
+#[cfg(feature = "search")]
+use crate::{eval::generated::GeneratedTextures, scene::Scene};
+#[cfg(feature = "search")]
+use std::path::Path;
+
+/// A texture that was made for levels, as a file.
+pub(super) struct Made {
+    /// What the lock says of it.
+    pub(super) locked: LockedGenerated,
+    /// The file's contents.
+    pub(super) bytes: Vec<u8>,
+}
+
+impl Request {
+    /// The folder of the textures that are made for levels.
+    fn textures(&self) -> PathBuf {
+        self.beside("lod")
+    }
+
+    /// The files of made textures, in their folder.
+    pub(super) fn texture_files(&self, made: Vec<Made>) -> Files {
+        let folder = self.textures();
+        let files = made.into_iter();
+        files
+            .map(|made| (folder.join(made.locked.file), made.bytes))
+            .collect()
+    }
+}
+
+/// Makes textures of the images of a scene.
+#[cfg(feature = "search")]
+pub(super) fn make(scene: &Scene, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
+    let all = GeneratedTextures::new(textures.iter().map(|texture| &texture.generated));
+    let all = all.map_err(|_| Diagnostic::error("internal error: a texture cannot be made"))?;
+    let baked = all.baked(scene.constant(), &scene.baked);
+    let named = textures.iter().zip(baked);
+    named
+        .map(|(texture, baked)| {
+            let (extension, bytes) = baked.file()?;
+            let [width, height, _] = baked.texture.size(0);
+            let locked = LockedGenerated {
+                name: texture.name.clone(),
+                file: format!("{}.{extension}", texture.name),
+                hash: front::hash(&bytes),
+                format: baked.format.name().into(),
+                size: [width, height],
+                levels: baked.texture.level_count(),
+            };
+            Ok(Made { locked, bytes })
+        })
+        .collect()
+}
+
+/// The textures of a lock: made again where there is an evaluator, else those that are there. They have to be what
+/// they were.
+///
+/// # Errors
+/// When they are not, or the scene cannot be read.
+pub(super) fn again(
+    request: &Request,
+    read: &Relocked,
+    textures: &[GeneratedTexture],
+) -> Result<Vec<Made>> {
+    if textures.is_empty() {
+        return Ok(Vec::new());
+    }
+    let made = found(request, read, textures)?;
+    for (at, texture) in textures.iter().enumerate() {
+        let name = &texture.name;
+        let mut locked = read.lock.generated.iter();
+        let locked = locked.find(|locked| locked.name == *name);
+        if locked.is_none_or(|locked| locked.hash != made[at].locked.hash) {
+            return Err(Diagnostic::error(format!(
+                "the lock is stale: the texture `{name}` that was made for levels is not what it was"
+            ))
+            .with_note("renew it: run lodc without `--locked`, and commit what it writes"));
+        }
+    }
+    Ok(made)
+}
+
+#[cfg(feature = "search")]
+fn found(request: &Request, read: &Relocked, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
+    let lock = request.lock();
+    let folder = lock.parent().unwrap_or(Path::new(""));
+    let locked = read
+        .lock
+        .scene
+        .as_ref()
+        .map(|scene| folder.join(&scene.file));
+    let scene = request.scene.clone().or(locked);
+    make(&Scene::read(&read.source, scene.as_deref())?, textures)
+}
+
+#[cfg(not(feature = "search"))]
+fn found(request: &Request, read: &Relocked, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
+    let made = textures.iter().map(|texture| {
+        let mut locked = read.lock.generated.iter();
+        let locked = locked.find(|locked| locked.name == texture.name);
+        let locked = locked.cloned().unwrap_or_default();
+        let file = request.textures().join(&locked.file);
+        let bytes = std::fs::read(&file).map_err(|error| {
+            Diagnostic::error(format!("cannot read `{}`: {error}", file.display())).with_note(
+                "it was made for levels, and is committed with the lock: run lodc on the shader to make it again",
+            )
+        })?;
+        let hash = front::hash(&bytes);
+        Ok(Made {
+            locked: LockedGenerated { hash, ..locked },
+            bytes,
+        })
+    });
+    made.collect()
+}

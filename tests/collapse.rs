@@ -1,0 +1,493 @@
+//! Textures that are made for levels: what they hold, which files they become, and Olano's own example.
+#![cfg(feature = "search")]
+
+mod fixtures;
+
+use fixtures::Goldens;
+use lodc::compile::{self, CompareRequest, Request, normal_form};
+use lodc::emit::{self, EmitLevel, Form, Output, write_atomically};
+use lodc::eval::generated::{GeneratedTextures, Store, TexelFormat};
+use lodc::eval::lane::{LANES, Mask};
+use lodc::eval::machine::{Bindings, Machine, Resource};
+use lodc::eval::program::Program;
+use lodc::eval::texture::{Dimension, Image, Sampler, Texture};
+use lodc::front::Source;
+use lodc::scene::Scene;
+use lodc::search::{SampleSet, Samples, Stand};
+use lodc_passes::texture_collapse::TextureCollapse;
+use lodc_passes::{Candidate, Class, Pass, Shader, Stage, facts, recipe};
+use naga::Binding;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+#[test]
+fn the_example_of_the_paper_becomes_one_constant_in_his_steps() {
+    let folder = Path::new("testdata/derivations");
+    let source = Source::read(&folder.join("silk.wgsl")).expect("it parses");
+    let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).expect("it is small");
+    let vertex = base.index(Stage::Vertex).expect("it has one");
+    let vertex = Program::compile(base.module(), vertex, &[]).expect("it runs");
+    let stand = Stand {
+        base: &base,
+        vertex: &vertex,
+        scene: &scene,
+    };
+    let set = SampleSet::new(&stand, scene.farthest, Samples::Search).expect("it runs");
+    let mut steps = vec![("the original".to_owned(), base.clone())];
+    for (pass, choice) in [
+        ("texture-collapse", "levels"),
+        ("texture-removal", "seen-mean"),
+        ("texture-collapse", "same"),
+        ("texture-removal", "seen-mean"),
+    ] {
+        let (_, shader) = &steps[steps.len() - 1];
+        let facts = set.facts(shader);
+        let offered: Vec<Candidate> = recipe::pass(pass)
+            .expect("it is known")
+            .candidates(shader, &facts);
+        // The sky goes before the cloth, which is all that is left in the end.
+        let of_sky = |c: &&Candidate| !c.site.path().contains("silk") || steps.len() > 2;
+        let mut wanted = offered.iter().filter(|c| c.choice.starts_with(choice));
+        let candidate = match pass {
+            "texture-removal" if steps.len() == 2 => wanted.find(|c| {
+                let facts = facts.values.get(&c.site);
+                facts.is_some() && c.site.path().contains("flowers") || {
+                    let (_, value) = shader.find(&c.site).expect("it is there");
+                    let users = shader.function(Stage::Fragment).expect("it has one");
+                    matches!(&users.expressions[value], naga::Expression::ImageSample { coordinate, .. }
+                        if matches!(users.expressions[*coordinate], naga::Expression::Math { .. }))
+                }
+            }),
+            _ => wanted.find(of_sky),
+        };
+        let candidate = candidate.unwrap_or_else(|| panic!("{pass} {choice}: {offered:?}"));
+        let made = recipe::apply(shader, candidate).expect("it was offered");
+        made.validate().expect("it is valid");
+        set.measure(&made).expect("it runs");
+        steps.push((candidate.to_string(), made));
+    }
+    let mut golden = String::new();
+    for (says, shader) in &steps {
+        let level = EmitLevel {
+            autolod: 1.0,
+            shader: shader.clone(),
+            distance: 1.0,
+            error: 0.0,
+            cost: 1.0,
+            says: "a step".into(),
+        };
+        let files = Output {
+            form: Form::Files,
+            ..Output::default()
+        };
+        let files = emit::emit(&source, &base, &[level], files).expect("it can be written");
+        let text = String::from_utf8(files[1].1.clone()).expect("WGSL is text");
+        let kept = text.lines().filter(|line| line.starts_with("@group(1)"));
+        let stage = text.find("@fragment").expect("it has a fragment stage");
+        let _ = writeln!(golden, "# {says}");
+        for line in kept {
+            let _ = writeln!(golden, "{line}");
+        }
+        let _ = writeln!(golden, "\n{}", &text[stage..]);
+    }
+    let mut goldens = Goldens::of("collapse");
+    goldens.compare("silk", &folder.join("silk.steps"), &golden);
+    goldens.finish();
+    assert_eq!(steps[4].1.sampled_textures(), 0);
+}
+
+/// Numbers that look random.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) % end
+    }
+}
+
+/// An expression over the samples of three textures, as text.
+fn expression(random: &mut Random, depth: u64) -> String {
+    if depth == 0 || random.below(5) == 0 {
+        return match random.below(4) {
+            0 => format!(
+                "vec4f(0.{}, 0.25, {}.0, 0.5)",
+                random.below(10),
+                random.below(3)
+            ),
+            texture => format!("textureSample(t{}, s, uv)", texture - 1),
+        };
+    }
+    let a = expression(random, depth - 1);
+    match random.below(9) {
+        0 => format!("clamp({a}, vec4f(0.0), vec4f(1.0))"),
+        1 => format!("abs({a} - 0.5)"),
+        2 => format!("({a}).bgra"),
+        3 => format!("sqrt(max({a}, vec4f(0.0)))"),
+        4 => format!("vec4f(({a}).rgb * ({a}).g, 1.0)"),
+        operation => {
+            let b = expression(random, depth - 1);
+            match operation {
+                5 => format!("({a} * {b})"),
+                6 => format!("({a} + 0.5 * {b})"),
+                7 => format!("mix({a}, {b}, 0.25)"),
+                _ => format!("max({a}, {b})"),
+            }
+        }
+    }
+}
+
+/// What a fragment stage returns at coordinates, each in a quad of its own.
+fn at(shader: &Shader, bindings: &Bindings, points: &[[f32; 2]]) -> Vec<[f32; 4]> {
+    let entry = shader.index(Stage::Fragment).expect("it has one");
+    let program = Program::compile(shader.module(), entry, &[]).expect("it runs");
+    let mut machine = Machine::new(&program, bindings);
+    let mut outputs = vec![[0; LANES]; program.outputs().len()];
+    let mut found = Vec::new();
+    for points in points.chunks(LANES / 4) {
+        let inputs = program.inputs().iter().map(|slot| {
+            std::array::from_fn(|lane| match slot.binding {
+                Binding::Location { .. } => {
+                    let point = points[(lane / 4).min(points.len() - 1)];
+                    point[slot.component].to_bits()
+                }
+                Binding::BuiltIn(_) => 0,
+            })
+        });
+        let inputs: Vec<_> = inputs.collect();
+        machine.run(&inputs, Mask::ALL, Mask::ALL, &mut outputs);
+        for i in 0..points.len() {
+            let mut texel = [0.0; 4];
+            for (slot, words) in program.outputs().iter().zip(&outputs) {
+                texel[slot.component] = f32::from_bits(words[4 * i]);
+            }
+            found.push(texel);
+        }
+    }
+    found
+}
+
+#[test]
+fn collapsed_expressions_are_the_original_texel_for_texel() {
+    const EDGE: u32 = 16;
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut texture = || {
+        let texels = (0..EDGE * EDGE).map(|_| [0; 4].map(|_| random.below(256) as f32 / 255.0));
+        let image = Image {
+            width: EDGE,
+            height: EDGE,
+            texels: texels.collect(),
+        };
+        let texture = Texture::new(Dimension::D2, vec![image]).expect("it has texels");
+        Resource::Texture(Arc::new(texture.with_mip_chain()))
+    };
+    let mut bindings = Bindings::new();
+    for binding in 0..3 {
+        bindings.insert((0, binding), texture());
+    }
+    let nearest = Sampler {
+        linear_magnification: false,
+        linear_minification: false,
+        ..Sampler::default()
+    };
+    bindings.insert((0, 3), Resource::Sampler(Arc::new(nearest)));
+    let centres =
+        (0..EDGE * EDGE).map(|i| [i % EDGE, i / EDGE].map(|x| (x as f32 + 0.5) / EDGE as f32));
+    let centres: Vec<[f32; 2]> = centres.collect();
+
+    let mut formats = std::collections::BTreeSet::new();
+    let mut collapsed = 0;
+    for seed in 0..120 {
+        let mut random = Random(seed * 77 + 1);
+        let text = format!(
+            "@group(0) @binding(0) var t0: texture_2d<f32>;
+             @group(0) @binding(1) var t1: texture_2d<f32>;
+             @group(0) @binding(2) var t2: texture_2d<f32>;
+             @group(0) @binding(3) var s: sampler;
+             @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {{
+                 return {} + vec4f(uv, 0.0, 0.0);
+             }}",
+            expression(&mut random, 4)
+        );
+        let source = Source::parse("random.wgsl", text.as_str()).unwrap_or_else(|e| panic!("{e}"));
+        let base = normal_form(&source).expect("it is small");
+        let known = facts::TextureFacts {
+            mean: vec![[0.5; 4]],
+            ..facts::TextureFacts::default()
+        };
+        let names = ["t0", "t1", "t2"];
+        let facts = lodc_passes::Facts {
+            textures: names
+                .iter()
+                .map(|name| ((*name).to_owned(), known.clone()))
+                .collect(),
+            ..lodc_passes::Facts::default()
+        };
+        for candidate in TextureCollapse.candidates(&base, &facts) {
+            let variant = recipe::apply(&base, &candidate).expect("it was offered");
+            variant
+                .validate()
+                .unwrap_or_else(|e| panic!("{candidate}: {e:?}\n{text}"));
+            let accesses = |shader: &Shader| {
+                let function = shader.function(Stage::Fragment).expect("it has one");
+                let reads = function.expressions.iter();
+                reads
+                    .filter(|(_, e)| matches!(e, naga::Expression::ImageSample { .. }))
+                    .count()
+            };
+            assert!(accesses(&variant) <= accesses(&base), "{candidate}\n{text}");
+            let textures = GeneratedTextures::of(&variant).expect("it runs");
+            let mut bound = bindings.clone();
+            textures.bind(&mut bound, &Store::default());
+            let baked = textures.baked(&bindings, &Store::default()).remove(0);
+            formats.insert(baked.format);
+            let limit = match baked.format {
+                TexelFormat::Rgba16Float => 1.0 / 2048.0,
+                _ => 0.5 / 255.0 * 2.3,
+            };
+            // What the format leaves may be scaled by what is done to it afterwards, which is nothing but a sum here.
+            let pairs = at(&base, &bound, &centres)
+                .into_iter()
+                .zip(at(&variant, &bound, &centres));
+            for (original, now) in pairs {
+                for (a, b) in original.iter().zip(&now) {
+                    let off = (a - b).abs() / a.abs().max(1.0);
+                    assert!(off <= limit, "{candidate}: {original:?} {now:?}\n{text}");
+                }
+            }
+            if TextureCollapse.class(&candidate) == Class::Lossless {
+                assert!(
+                    baked.is_chain || baked.format == TexelFormat::Rgba16Float,
+                    "{candidate}\n{text}"
+                );
+            }
+            collapsed += 1;
+        }
+    }
+    assert!(collapsed > 60, "{collapsed}");
+    assert_eq!(formats.len(), 3, "{formats:?}");
+}
+
+/// A folder of the test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("collapse")
+        .join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("the target folder can be written");
+    folder
+}
+
+/// The same of a host that binds no textures that are made for levels.
+fn refused_request(request: &Request) -> Request {
+    Request {
+        textures: false,
+        ..request.clone()
+    }
+}
+
+#[test]
+fn textures_become_files_that_the_lock_makes_again() {
+    let folder = folder("files");
+    let textures = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/textures");
+    let shader = fs::read_to_string("testdata/derivations/silk.wgsl").expect("it is there");
+    let scene = fs::read_to_string("testdata/derivations/silk.toml").expect("it is there");
+    let scene = scene.replace("../materials/textures", &textures.to_string_lossy());
+    fs::write(folder.join("silk.wgsl"), shader).expect("it can be written");
+    fs::write(folder.join("silk.toml"), scene).expect("it can be written");
+    let request = Request {
+        shader: folder.join("silk.wgsl"),
+        textures: true,
+        ..Request::default()
+    };
+    let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let made = |files: &compile::Files| -> Vec<(PathBuf, Vec<u8>)> {
+        let all = files.iter();
+        let mut made: Vec<_> = all
+            .filter(|(path, _)| path.starts_with(folder.join("silk.lod")))
+            .cloned()
+            .collect();
+        made.sort();
+        made
+    };
+    let before = made(&compiled.files);
+    assert!(
+        !before.is_empty(),
+        "{:?}",
+        compiled.files.iter().map(|(f, _)| f).collect::<Vec<_>>()
+    );
+    // A host that binds none, or has no memory for them, gets none, and is told what they would gain.
+    let refused = [
+        refused_request(&request),
+        Request {
+            max_texture_memory: Some(0),
+            ..request.clone()
+        },
+    ];
+    let refused = refused.map(|request| {
+        let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(made(&compiled.files), []);
+        compiled.report
+    });
+    let gains = |report: &lodc::report::Report| -> Vec<Option<f64>> {
+        let levels = report.levels.iter();
+        levels.map(|level| level.cost.ratio_with_textures).collect()
+    };
+    assert!(
+        gains(&refused[0]).iter().any(Option::is_some),
+        "{:?}",
+        gains(&refused[0])
+    );
+    let inspected = compile::inspect(&refused_request(&request)).unwrap_or_else(|e| panic!("{e}"));
+    assert!(inspected.contains("texture-collapse*"), "{inspected}");
+    write_atomically(&compiled.files).expect("they can be written");
+    let (files, warnings) = compile::locked(&request).unwrap_or_else(|e| panic!("{e}"));
+    assert!(warnings.is_empty());
+    assert_eq!(made(&files), before);
+    for (file, bytes) in &files {
+        assert_eq!(
+            &fs::read(file).expect("it was written"),
+            bytes,
+            "{}",
+            file.display()
+        );
+    }
+    let text = fs::read_to_string(folder.join("silk.lod.wgsl")).expect("it was written");
+    for (file, _) in &before {
+        let name = file.file_stem().expect("it has one").to_string_lossy();
+        assert!(
+            text.contains(&format!("var {name}: texture_2d<f32>;")),
+            "{text}"
+        );
+    }
+    // What is emitted draws what was measured, with the textures that were written.
+    let compared = compile::compare(
+        &CompareRequest {
+            original: request.clone(),
+            other: folder.join("silk.lod.wgsl"),
+            ..CompareRequest::default()
+        },
+        &|| {},
+    );
+    let compared = compared.unwrap_or_else(|e| panic!("{e}"));
+    assert!(compared.warnings.is_empty(), "{:?}", compared.warnings);
+    for level in &compiled.report.levels {
+        let mut at = compared.comparison.distances.iter();
+        let at = at.find(|at| at.distance == level.distance);
+        let at = at.expect("every level starts at a distance of the scene");
+        let off = (at.error.rmse - level.error.rmse).abs();
+        assert!(off < 1e-6, "{} {}", at.error.rmse, level.error.rmse);
+    }
+    #[cfg(feature = "gpu")]
+    drawn_by_a_gpu(&request, &compared.comparison);
+    // Another image in the place of a source makes another texture.
+    let lock = fs::read_to_string(folder.join("silk.lod.toml")).expect("it was written");
+    let other = lock.replace("loctx_0", "loctx_7");
+    fs::write(folder.join("silk.lod.toml"), other).expect("it can be written");
+    let error = compile::locked(&request).expect_err("it is another");
+    assert!(error.message.contains("is not what it was"), "{error}");
+}
+
+/// Holds a device's figures of the emitted shader, with its textures, against the evaluator's.
+#[cfg(feature = "gpu")]
+fn drawn_by_a_gpu(request: &Request, by_evaluator: &lodc::report::Comparison) {
+    match lodc::gpu::Gpu::open(None) {
+        Ok(_) => {}
+        Err(error) if std::env::var_os("CI").is_some() => panic!("{error}"),
+        Err(error) => {
+            eprintln!("SKIPPED: generated textures on a GPU: {error}");
+            return;
+        }
+    }
+    let compared = compile::compare(
+        &CompareRequest {
+            original: request.clone(),
+            other: request.shader.with_extension("lod.wgsl"),
+            renderer: compile::DrawnBy::Gpu { adapter: None },
+            ..CompareRequest::default()
+        },
+        &|| {},
+    );
+    let compared = compared.unwrap_or_else(|e| panic!("{e}"));
+    let pairs = by_evaluator
+        .distances
+        .iter()
+        .zip(&compared.comparison.distances);
+    for (cpu, gpu) in pairs {
+        let (at, cpu, gpu) = (cpu.distance, cpu.error.rmse, gpu.error.rmse);
+        println!("at {at:.2}: error {cpu:.5} by evaluator, {gpu:.5} by GPU");
+        assert!((cpu - gpu).abs() <= (0.05 * cpu).max(0.001), "{cpu} {gpu}");
+    }
+}
+
+/// Noise over a plane, and what reads a texture beside it.
+const NOISE: &str = "
+    @group(0) @binding(0) var<uniform> camera: mat4x4f;
+    @group(0) @binding(1) var smooth_sampler: sampler;
+    @group(0) @binding(2) var paper: texture_2d<f32>;
+    struct Surface { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
+    @vertex fn vs(@location(0) position: vec3f, @location(2) uv: vec2f) -> Surface {
+        return Surface(camera * vec4f(position, 1.0), uv);
+    }
+    fn waves(p: vec2f) -> f32 {
+        var sum = 0.0;
+        for (var i = 1; i < 6; i++) {
+            sum += sin(p.x * 11.0 * f32(i)) * cos(p.y * 13.0 * f32(i)) / f32(i);
+        }
+        return sum;
+    }
+    @fragment fn fs(in: Surface) -> @location(0) vec4f {
+        let marble = 0.5 + 0.2 * waves(in.uv + 0.1 * waves(in.uv.yx));
+        let grain = textureSample(paper, smooth_sampler, in.uv).g;
+        return vec4f(marble, marble * marble, 0.25 + 0.25 * grain, 1.0);
+    }";
+
+#[test]
+fn the_error_of_a_procedural_bake_falls_with_its_resolution() {
+    let source = Source::parse("noise.wgsl", NOISE).unwrap_or_else(|e| panic!("{e}"));
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/textures/grime.png");
+    let scene = "object = \"plane\"\nresolution = [128, 128]\nlevels = 3\n[distance]\nnearest = 2.5\nfarthest = 20\n[views]\ndirections = [[0, 0, 1]]\n[uniforms]\ncamera = \"model-view-projection\"\n";
+    let scene = format!("{scene}[textures]\npaper = {paper:?}\n");
+    let scene = Scene::resolve(&source, Some((Path::new("noise.toml"), &scene)));
+    let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).expect("it is small");
+    let vertex = base.index(Stage::Vertex).expect("it has one");
+    let vertex = Program::compile(base.module(), vertex, &[]).expect("it runs");
+    let stand = Stand {
+        base: &base,
+        vertex: &vertex,
+        scene: &scene,
+    };
+    let set = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
+    let offered = TextureCollapse.candidates(&base, &set.facts(&base));
+    let bake = offered.iter().find(|c| c.choice.starts_with("bake"));
+    let bake = bake.unwrap_or_else(|| panic!("{offered:?}"));
+    let (kind, _) = bake.choice.rsplit_once(' ').expect("it has an edge");
+    let floor = set.original().error.square();
+    let mut before = f64::INFINITY;
+    println!("edge  added squared error, by {bake}");
+    for edge in [8, 16, 32, 64, 128, 256] {
+        let candidate = Candidate {
+            choice: format!("{kind} {edge}"),
+            ..bake.clone()
+        };
+        let variant = recipe::apply(&base, &candidate).expect("it applies");
+        let measured = set.measure(&variant).expect("it runs");
+        let added = measured.error.square() - floor;
+        println!("{edge:4}  {added:.2e}");
+        assert!(
+            added < 0.5 * before || added < 1e-5,
+            "{edge}: {added} after {before}"
+        );
+        before = added;
+        // One sample takes the place of the rounds of two loops.
+        assert_eq!(measured.used.work.samples, 2.0);
+        assert!(measured.used.work.operations() < 0.2 * set.original().used.work.operations());
+    }
+    assert!(before < 1e-5, "{before}");
+}
