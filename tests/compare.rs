@@ -2,6 +2,7 @@
 #![cfg(feature = "search")]
 
 mod fixtures;
+mod moved;
 
 use lodc::Result;
 use lodc::compile::{self, CompareRequest, Compared, Request, compare};
@@ -62,6 +63,44 @@ fn grey(level: &str) -> String {
 }
 
 const ENCODED: &str = "output = \"encoded\"\nresolution = [16, 16]\nlevels = 2\n";
+
+#[test]
+fn a_block_of_parameters_is_filled_by_the_entry_point_of_its_own_text() {
+    let a = "
+        struct Light { direction: vec3f, strength: f32 }
+        @group(0) @binding(0) var<uniform> light: Light;
+        @group(0) @binding(1) var<uniform> camera: mat4x4f;
+        struct Surface { @builtin(position) clip: vec4f, @location(0) normal: vec3f }
+        @vertex fn vs(@location(0) position: vec3f, @location(1) normal: vec3f) -> Surface {
+            return Surface(camera * vec4f(position, 1.0), normal);
+        }
+        @fragment fn fs(in: Surface) -> @location(0) vec4f {
+            let towards = normalize(light.direction);
+            let bright = pow(light.strength, 1.5) * vec3f(0.9, 0.8, 0.7);
+            return vec4f(bright * max(dot(normalize(in.normal), towards), 0.0), 1.0);
+        }";
+    let scene = "resolution = [32, 32]\nlevels = 2\n[uniforms]\ncamera = \"model-view-projection\"
+        \"light.strength\" = { samples = [0.25, 0.9] }\n\"light.direction\" = [0.5, 0.2, 0.6]";
+    let folder = folder("parameters", &[("a.wgsl", a), ("a.toml", scene)]);
+    let (shader, files) = moved::with_parameters(&folder.join("a.wgsl"));
+    assert!(shader.parameters().len() > 1);
+    let text = String::from_utf8_lossy(&files[0].1).into_owned();
+    let excess = |text: &str| {
+        fs::write(folder.join("b.wgsl"), text).expect("it can be written");
+        let mut request = request(&folder);
+        request.autolod = Some(2.0);
+        let found = compare(&request, &|| {}).unwrap_or_else(|e| panic!("{e}"));
+        found.comparison.distances[0].error.excess
+    };
+    assert_eq!(excess(&text), 0.0);
+    // Another one that stores something else shows.
+    let other = text.replace(
+        "parameters_stored.bright = ",
+        "parameters_stored.bright = 0.5 * ",
+    );
+    assert_ne!(other, text);
+    assert!(excess(&other) > 0.01);
+}
 
 #[test]
 fn errors_worked_out_by_hand() {

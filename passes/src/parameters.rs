@@ -10,10 +10,11 @@
 //! does what it does by itself. Both variables are one buffer's; they have the bindings behind the author's last one.
 //! A member that no stage reads any more goes, with what computed it, and with the last member the block.
 
-use crate::edit::{Edit, without};
+use crate::edit::Edit;
 use crate::fingerprint::{Declared, of_function};
 use crate::interface::laid_out;
 use crate::live::keep_needed;
+use crate::operands;
 use crate::shader::{Fingerprint, Shader, Stage, ValueId};
 use naga::{
     AddressSpace, Arena, Binding, Block, EntryPoint, Expression, Function, FunctionResult,
@@ -74,38 +75,82 @@ impl Shader {
     pub fn parameters_returned(&self) -> Option<(Module, usize)> {
         let block = self.parameter_block()?;
         let entry = self.index(Stage::Parameter)?;
-        let mut module = without(&self.module, entry);
-        let mut function = self.module.entry_points[entry].function.clone();
-        let Stored { at, .. } = stored(&function.body, &function.expressions)?;
-        let Some(Statement::Store { value, .. }) = function.body.get(at) else {
-            return None;
-        };
-        let value = *value;
-        let mut members = members(&module, block.ty).to_vec();
-        for (location, member) in (0..).zip(&mut members) {
-            member.binding = Some(Binding::Location {
-                location,
-                interpolation: None,
-                sampling: None,
-                blend_src: None,
-                per_primitive: false,
-            });
-        }
-        let ty = laid_out(&mut module, "Returned".into(), members);
-        if let Expression::Compose { ty: of, .. } = &mut function.expressions[value] {
-            *of = ty;
-        }
-        let end = [Statement::Return { value: Some(value) }];
-        let last = function.body.len();
-        function
-            .body
-            .splice(at..last, Block::from_vec(end.to_vec()));
-        function.result = Some(FunctionResult { ty, binding: None });
-        module.entry_points[entry].function = function;
-        // Without an interface it is like a vertex stage.
-        module.entry_points[entry].stage = ShaderStage::Vertex;
-        Some((module, entry))
+        Some((returned(&self.module, entry, block.stored)?, entry))
     }
+}
+
+/// A module in which an entry point that fills a block returns the block's members, each at the location that is its place,
+/// and stores nothing. `stored` is the buffer that it stores to. `None` when the entry point may end early, or what it stores
+/// to is no structure of scalars and vectors of 32 bits.
+pub fn returned(module: &Module, entry: usize, stored: Handle<GlobalVariable>) -> Option<Module> {
+    let mut module = module.clone();
+    let ty = module.global_variables[stored].ty;
+    let TypeInner::Struct { members, span } = &module.types[ty].inner else {
+        return None;
+    };
+    let (mut members, span) = (members.clone(), *span);
+    for (location, member) in (0..).zip(&mut members) {
+        let inner = &module.types[member.ty].inner;
+        let is_plain = matches!(inner, TypeInner::Scalar(_) | TypeInner::Vector { .. });
+        if !is_plain || inner.scalar_width() != Some(4) {
+            return None;
+        }
+        member.binding = Some(Binding::Location {
+            location,
+            interpolation: None,
+            sampling: None,
+            blend_src: None,
+            per_primitive: false,
+        });
+    }
+    let count = members.len() as u32;
+    let ty = Type {
+        name: Some("Returned".into()),
+        inner: TypeInner::Struct { members, span },
+    };
+    let ty = module.types.insert(ty, Span::UNDEFINED);
+    // What was a buffer is a variable, that functions may store to as well.
+    let variable = &mut module.global_variables[stored];
+    variable.space = AddressSpace::Private;
+    variable.binding = None;
+    let point = module.entry_points.get_mut(entry)?;
+    let function = &mut point.function;
+    if let Some(Statement::Return { .. }) = function.body.last() {
+        let last = function.body.len() - 1;
+        function.body.cull(last..);
+    }
+    let mut ends = true;
+    operands::walk(&function.body, &mut |statement| {
+        ends &= !matches!(statement, Statement::Return { .. });
+    });
+    if !ends {
+        return None;
+    }
+    let base = add(function, Expression::GlobalVariable(stored));
+    let mut components = Vec::new();
+    for index in 0..count {
+        let pointer = add(function, Expression::AccessIndex { base, index });
+        components.push(add(function, Expression::Load { pointer }));
+    }
+    let value = Some(add(function, Expression::Compose { ty, components }));
+    let end = Statement::Return { value };
+    function.body.push(end, Span::UNDEFINED);
+    function.result = Some(FunctionResult { ty, binding: None });
+    // Without an interface it is like a vertex stage.
+    point.stage = ShaderStage::Vertex;
+    point.workgroup_size = [0; 3];
+    Some(module)
+}
+
+/// Puts a value at the end of a function.
+fn add(function: &mut Function, expression: Expression) -> Handle<Expression> {
+    let is_emitted = !expression.needs_pre_emit();
+    let value = function.expressions.append(expression, Span::UNDEFINED);
+    if is_emitted {
+        let range = naga::Range::new_from_bounds(value, value);
+        function.body.push(Statement::Emit(range), Span::UNDEFINED);
+    }
+    value
 }
 
 /// The store of a parameter stage.
@@ -390,15 +435,6 @@ impl Shader {
         let mut function = old.clone();
         let last = function.body.len();
         function.body.cull(at..last);
-        let add = |function: &mut Function, expression: Expression| {
-            let is_emitted = !expression.needs_pre_emit();
-            let value = function.expressions.append(expression, Span::UNDEFINED);
-            if is_emitted {
-                let range = naga::Range::new_from_bounds(value, value);
-                function.body.push(Statement::Emit(range), Span::UNDEFINED);
-            }
-            value
-        };
         let base = add(&mut function, Expression::GlobalVariable(variable));
         for place in places {
             let index = *place as u32;
@@ -537,7 +573,7 @@ mod tests {
         let returned = members(&module, ty.expect("it returns them"));
         assert_eq!(returned.len(), 2);
         assert!(returned.iter().all(|member| member.binding.is_some()));
-        let mut statements = function.body.iter();
-        assert!(statements.all(|s| !matches!(s, Statement::Store { .. })));
+        let mut variables = module.global_variables.iter();
+        assert!(variables.all(|(_, v)| !matches!(v.space, AddressSpace::Storage { .. })));
     }
 }

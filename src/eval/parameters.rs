@@ -1,10 +1,11 @@
-//! Runs the parameter stage of a variant, and binds what it computes as the block that its other stages read.
+//! Runs the parameter stage of a variant, or of a text that was emitted, and binds what it computes as the block that its other stages read.
 
 use super::lane::{LANES, Mask};
 use super::machine::{Bindings, Machine, Resource};
 use super::program::{Program, Refused};
-use lodc_passes::Shader;
-use naga::{Binding, TypeInner};
+use crate::front::filled::Filled;
+use lodc_passes::{Shader, parameters};
+use naga::{Binding, GlobalVariable, Handle, Module, TypeInner};
 use std::sync::Arc;
 
 /// Uniform buffers are bound in whole vectors of four.
@@ -34,13 +35,34 @@ impl ParameterStage {
         else {
             return Ok(None);
         };
-        let variable = &shader.module().global_variables[block.read];
+        Self::returned(shader.module(), &module, entry, block.read)
+    }
+
+    /// That of a uniform which a text fills itself; nothing where the entry point that does has another end.
+    ///
+    /// # Errors
+    /// When the evaluator refuses the entry point.
+    pub(crate) fn of_text(module: &Module, filled: &Filled) -> Result<Option<Self>, Refused> {
+        match parameters::returned(module, filled.entry, filled.stored) {
+            Some(returned) => Self::returned(module, &returned, filled.entry, filled.read),
+            None => Ok(None),
+        }
+    }
+
+    /// That whose entry point returns the members of a uniform of the module.
+    fn returned(
+        module: &Module,
+        returned: &Module,
+        entry: usize,
+        read: Handle<GlobalVariable>,
+    ) -> Result<Option<Self>, Refused> {
+        let variable = &module.global_variables[read];
         let (Some(binding), TypeInner::Struct { members, span }) =
-            (&variable.binding, &shader.module().types[block.ty].inner)
+            (&variable.binding, &module.types[variable.ty].inner)
         else {
             return Ok(None);
         };
-        let program = Program::compile(&module, entry, &[])?;
+        let program = Program::compile(returned, entry, &[])?;
         let offsets = program.outputs().iter().map(|slot| match slot.binding {
             Binding::Location { location, .. } => {
                 members[location as usize].offset as usize + 4 * slot.component

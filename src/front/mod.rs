@@ -11,6 +11,7 @@
 mod entry;
 mod feed;
 mod files;
+pub(crate) mod filled;
 mod glsl;
 pub(crate) mod identifiers;
 #[cfg(feature = "imports")]

@@ -1,4 +1,5 @@
-//! Which parts of a buffer the chosen entry points may read: the others need no value.
+//! Which parts of a buffer the chosen entry points may read, and those that fill a uniform of theirs: the others need no
+//! value.
 
 use super::Source;
 use naga::valid::{FunctionInfo, ModuleInfo};
@@ -20,8 +21,9 @@ impl Used {
             Some(source.fragment_entry().0),
             source.vertex_entry().map(|(i, _)| i),
         ];
+        let filling = source.filled().into_iter().map(|filled| filled.entry);
         let reached = |i: usize| !source.info.get_entry_point(i)[handle].is_empty();
-        if !entries.into_iter().flatten().any(reached) {
+        if !entries.into_iter().flatten().chain(filling).any(reached) {
             return Self::Nothing;
         }
         let variable = &source.module.global_variables[handle];

@@ -37,7 +37,9 @@ pub use textures::SceneTexture;
 use crate::eval::draw::{Blend, DrawState, Lit, state_of};
 use crate::eval::generated::Store;
 use crate::eval::machine::Bindings;
+use crate::eval::parameters::ParameterStage;
 use crate::eval::raster::{Attribute, Coverage, Frame};
+use crate::eval::refusal;
 use crate::eval::texture::{Sampler, Wrap};
 use crate::front::{Source, VertexStage, hash, inputs, read_text};
 use crate::{Diagnostic, Result};
@@ -127,6 +129,8 @@ pub struct Scene {
     constant: Bindings,
     /// The textures that were made of its own.
     pub(crate) baked: Store,
+    /// What fills the uniforms that the shader fills itself, in this order.
+    filled: Vec<Arc<ParameterStage>>,
     samples: usize,
 }
 
@@ -452,6 +456,7 @@ impl Scene {
             constant: Bindings::new(),
             baked: Store::default(),
             buffers,
+            filled: filled(source)?,
         };
         if scene.uniform_samples() < scene.samples {
             scene.warnings.push(*Diagnostic::warning(format!(
@@ -539,6 +544,9 @@ impl Scene {
         for buffer in self.buffers.iter().filter(|b| !b.is_constant()) {
             let resource = buffer.resource(&pose, &self.sphere, draw);
             bindings.insert(buffer.slot(), resource);
+        }
+        for stage in &self.filled {
+            stage.bind(&mut bindings, self.mesh.draws().len());
         }
         Frame {
             mesh: self.mesh.clone(),
@@ -669,6 +677,20 @@ fn opaque(
         n => format!("{n} blended materials of the model are drawn opaque"),
     };
     Ok(Some(*Diagnostic::warning(message).with_note(why)))
+}
+
+/// What fills the uniforms that a shader fills itself.
+fn filled(source: &Source) -> Result<Vec<Arc<ParameterStage>>> {
+    let mut stages = Vec::new();
+    for filled in source.filled() {
+        let stage = ParameterStage::of_text(&source.module, &filled);
+        stages.extend(
+            stage
+                .map_err(|refused| refusal(&refused, source))?
+                .map(Arc::new),
+        );
+    }
+    Ok(stages)
 }
 
 /// What is drawn when the scene names no object: a sphere, or, for a vertex stage that takes nothing from a

@@ -91,7 +91,7 @@ fn levels_are_drawn_with_the_errors_that_the_evaluator_finds() {
             break;
         }
         let (source, scene) = read(&path);
-        let emitted = Emitted::new(&path);
+        let emitted = Emitted::new(&path, false);
         for gpu in &adapters {
             let interface = gpu.label().backend;
             let name = format!(
@@ -102,6 +102,27 @@ fn levels_are_drawn_with_the_errors_that_the_evaluator_finds() {
         }
     }
     assert!(wrong.is_empty(), "too far apart:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn levels_with_parameters_are_drawn_in_both_forms_as_the_evaluator_draws_them() {
+    let Some(gpu) = open("vulkan") else { return };
+    let (mut wrong, mut with_blocks) = (Vec::new(), 0);
+    let lines = ["levels = 3", "offsets = 1"];
+    for path in fixtures::small_materials(&scratch("levels-with-parameters"), 32, &lines) {
+        let name = path.file_stem().unwrap_or_default().display().to_string();
+        if !["pbr", "car_paint"].contains(&&*name) {
+            continue;
+        }
+        let (source, scene) = read(&path);
+        let emitted = Emitted::new(&path, true);
+        for text in [&emitted.whole, &emitted.uniform] {
+            with_blocks += usize::from(text.text.contains("fn lod_parameters("));
+        }
+        wrong.extend(emitted.judge(&gpu, &name, (&source, &scene)));
+    }
+    assert!(wrong.is_empty(), "too far apart:\n{}", wrong.join("\n"));
+    assert!(with_blocks >= 2, "{with_blocks} texts have a block");
 }
 
 /// What the main job makes of a material.
@@ -118,9 +139,11 @@ struct Emitted {
 }
 
 impl Emitted {
-    fn new(path: &Path) -> Self {
+    /// Of a material, with values in a block of parameters or without.
+    fn new(path: &Path, parameters: bool) -> Self {
         let request = Request {
             shader: path.to_owned(),
+            parameters,
             ..Request::default()
         };
         let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
@@ -167,8 +190,12 @@ impl Emitted {
             bits(&truth),
             "{name}: level 0 in a file of its own"
         );
-        let unset = pipeline(&renderer, stages(&self.whole), scene);
-        let unset = drawn(&mut renderer, &unset, scene, &near);
+        // The scene as it is for a text with a block of parameters, which its own entry point fills.
+        let own = Scene::read(&self.whole, Some(&self.scene)).unwrap_or_else(|e| panic!("{e}"));
+        let near = own.frames(scene.distances[0]).swap_remove(0);
+        let unset = Stages::of_source(&self.whole, &own).expect("it has both stages");
+        let unset = pipeline(&renderer, unset, &own);
+        let unset = drawn(&mut renderer, &unset, &own, &near);
         let mut apart = Apart::default();
         apart.add(scene, &unset, &truth);
         assert!(apart.most(0.0) <= STEP, "{name}: {}", apart.most(0.0));
@@ -193,17 +220,17 @@ impl Emitted {
         for ((auto_lod, distance), file) in self.levels.iter().zip(&self.files[1..]) {
             let what = format!("{name}, level at {auto_lod:.2}");
             let level = specialised(&self.whole, Some(*auto_lod));
-            let level = Stages::of_source(&level, scene);
+            let level = Stages::of_source(&level, &own);
             let of_evaluator = programs(level.expect("it has both stages"));
             let of_gpu = Stages {
                 auto_lod: Some(*auto_lod),
-                ..stages(&self.whole)
+                ..Stages::of_source(&self.whole, &own).expect("it has both stages")
             };
-            let of_gpu = pipeline(&renderer, of_gpu, scene);
+            let of_gpu = pipeline(&renderer, of_gpu, &own);
             // Nearer than a host would draw it, there is more to see.
             let mut apart = Apart::default();
-            let by_gpu = drawn(&mut renderer, &of_gpu, scene, &near);
-            apart.add(scene, &by_gpu, &evaluated(&of_evaluator, scene, &near));
+            let by_gpu = drawn(&mut renderer, &of_gpu, &own, &near);
+            apart.add(scene, &by_gpu, &evaluated(&of_evaluator, &own, &near));
             wrong.extend(apart.judge(&what, FILTERED));
             let mut apart = Apart::default();
             apart.add(scene, &by_uniform(*auto_lod), &by_gpu);
@@ -214,7 +241,7 @@ impl Emitted {
             apart.add(scene, &file, &by_gpu);
             wrong.extend(apart.judge(&format!("{what}, in a file of its own"), ROUNDED));
             let (mut by_gpu, mut by_evaluator) = (Error::default(), Error::default());
-            for frame in scene.frames(*distance) {
+            for frame in own.frames(*distance) {
                 let frame = Frame {
                     offset: [0.2, 0.1],
                     ..frame
@@ -225,10 +252,10 @@ impl Emitted {
                     ..frame.clone()
                 };
                 let truth = evaluated(&original_programs, scene, &fine);
-                let level = evaluated(&of_evaluator, scene, &frame);
+                let level = evaluated(&of_evaluator, &own, &frame);
                 by_evaluator.add(scene, &reference(scene, truth), &level);
                 let truth = drawn(&mut renderer, &original, scene, &fine);
-                let level = drawn(&mut renderer, &of_gpu, scene, &frame);
+                let level = drawn(&mut renderer, &of_gpu, &own, &frame);
                 by_gpu.add(scene, &reference(scene, truth), &level);
             }
             let (a, b) = (by_evaluator.rmse(), by_gpu.rmse());

@@ -10,6 +10,8 @@ mod blended;
 mod fixtures;
 mod levels;
 mod models;
+#[path = "../moved/mod.rs"]
+mod moved;
 mod parameters;
 #[path = "../pictures/mod.rs"]
 mod pictures;

@@ -313,6 +313,7 @@ pub(super) fn resolve(
             )?);
         }
     }
+    let filled = source.filled();
     let mut buffers = Vec::new();
     for (handle, variable) in source.module.global_variables.iter() {
         let table = match variable.space {
@@ -340,6 +341,11 @@ pub(super) fn resolve(
                 .with_note("declare a shorter array, or keep what is read of it in a texture"));
         }
         let mut used = Used::of(source, handle);
+        let mut blocks = filled.iter();
+        if blocks.any(|block| [block.read, block.stored].contains(&handle)) {
+            // The text's own entry point says what it holds.
+            used = Used::Nothing;
+        }
         if is_written(source, handle) {
             // The evaluator refuses the write, at its place; what the buffer holds is no question then.
             used = Used::Nothing;
