@@ -168,6 +168,11 @@ fn levels(base: &Shader, moves: bool) -> Vec<EmitLevel> {
         .collect()
 }
 
+/// Whether a file is of a kind, by its extension.
+fn is_a(path: &Path, kind: &str) -> bool {
+    path.extension().is_some_and(|extension| extension == kind)
+}
+
 /// Shows every shader of a folder to the judges in every form, with levels.
 fn emitted(folder: &str) {
     let mut wgsl = Vec::new();
@@ -211,7 +216,8 @@ fn emitted(folder: &str) {
                 Err(_) if transition != Transition::Pop => continue,
                 written => written.unwrap_or_else(|e| panic!("{e}")),
             };
-            for (path, bytes) in files {
+            // Beside the shader there may be Rust that fills its block.
+            for (path, bytes) in files.into_iter().filter(|(path, _)| is_a(path, "wgsl")) {
                 let stem = path.file_stem().expect("a name").to_string_lossy();
                 let text = String::from_utf8(bytes).expect("WGSL is text");
                 of_pixels_count += usize::from(per_pixel.is_some());
@@ -229,7 +235,7 @@ fn emitted(folder: &str) {
                 assert!(overrides, "{name} has no {} in SPIR-V", form.name());
                 continue;
             };
-            for (path, bytes) in files {
+            for (path, bytes) in files.into_iter().filter(|(path, _)| is_a(path, "spv")) {
                 let words: Vec<u32> = bytes
                     .chunks_exact(4)
                     .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
