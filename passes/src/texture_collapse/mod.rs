@@ -45,7 +45,7 @@ use crate::operands;
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, Work};
-use naga::Expression;
+use naga::{Expression, SampleLevel};
 use plan::{MOST_EDGE, Plan, is_operation};
 use seen::{Of, Sample, sample, seen_from};
 
@@ -275,6 +275,22 @@ fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
             }
             Some(_) => {}
         }
+    }
+    let counts = plan
+        .textures(flow)
+        .filter_map(|name| facts.textures.get(name));
+    let mut counts = counts.map(|texture| texture.mean.len());
+    let given = plan
+        .samples
+        .iter()
+        .any(|(_, read)| matches!(read.level, SampleLevel::Zero | SampleLevel::Exact(_)));
+    if given
+        && counts
+            .next()
+            .is_some_and(|first| counts.any(|other| other != first))
+    {
+        let why = "a level of detail that is given means another size in each of its textures";
+        return Err(Declined(why.into()));
     }
     if plan.kind == Kind::Resampled {
         let sampler = plan

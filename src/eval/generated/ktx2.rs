@@ -98,9 +98,9 @@ fn description(format: TexelFormat) -> Vec<u8> {
     let mut words = vec![
         block + 4,
         0,
-        2 | block << 16,
+        2 | (block << 16),
         // The colour model and the primaries are RGB and those of BT.709.
-        1 | 1 << 8 | transfer << 16,
+        1 | (1 << 8) | (transfer << 16),
         0,
         format.bytes() as u32,
         0,
@@ -117,7 +117,7 @@ fn description(format: TexelFormat) -> Vec<u8> {
             false => (0, 255),
         };
         words.extend([
-            at * bits | (bits - 1) << 16 | (channel | qualifiers) << 24,
+            (at * bits) | ((bits - 1) << 16) | ((channel | qualifiers) << 24),
             0,
             least,
             most,

@@ -41,7 +41,7 @@ pub struct Baked {
     pub texture: Arc<Texture>,
     /// How it is stored.
     pub format: TexelFormat,
-    /// Whether its MIP levels are those that a box filter makes of the finest one.
+    /// Whether it is flat, and its MIP levels are those that a box filter makes of the finest one.
     pub is_chain: bool,
     /// By how much the format changes a texel at most, in display values for colours.
     pub rounding: f32,
@@ -61,7 +61,7 @@ impl Baked {
     /// When it is no image that a PNG can hold; no bake makes such a one.
     pub fn file(&self) -> Outcome<(&'static str, Vec<u8>)> {
         let finest = &self.texture.levels()[0];
-        if !self.is_chain || self.texture.dimension() == Dimension::Cube {
+        if !self.is_chain {
             return Ok((ktx2::EXTENSION, ktx2::write(&self.texture, self.format)));
         }
         let texels = finest.texels.iter();
@@ -415,11 +415,10 @@ impl Bake {
             _ => Texture::of_levels(self.dimension, alone).with_mip_chain(),
         };
         let is_chain = format != TexelFormat::Rgba16Float
+            && self.dimension == Dimension::D2
             && chain.levels().iter().zip(&levels).all(|(chain, level)| {
-                let pairs = chain.texels.iter().zip(&level.texels);
-                pairs
-                    .into_iter()
-                    .all(|(a, b)| is_step_apart(format, a, b, used))
+                let mut pairs = chain.texels.iter().zip(&level.texels);
+                pairs.all(|(a, b)| is_step_apart(format, a, b, used))
             });
         let texture = match is_chain {
             true => chain,
