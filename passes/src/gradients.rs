@@ -22,6 +22,8 @@ pub struct Explicit {
     /// The shader, whose fragment stage has an input for each gradient behind its own. They have locations only so that
     /// they are inputs.
     pub shader: Shader,
+    /// For each of those inputs, in their order, which of the front's gradients it is.
+    pub inputs: Vec<usize>,
     /// What computes the gradients.
     pub front: Front,
 }
@@ -34,7 +36,7 @@ pub struct Front {
     pub function: Function,
     /// The id of each value; `None` for those that are made here.
     pub ids: Vec<Option<ValueId>>,
-    /// For each gradient its name and its type, in the order of the inputs.
+    /// For each gradient its name and its type, in the order in which they are returned.
     pub gradients: Vec<(String, TypeInner)>,
 }
 
@@ -139,8 +141,19 @@ pub fn explicit(shader: &Shader) -> Result<Option<Explicit>, NotExplicit> {
         };
         edit.replace(value, New::Value(new));
     }
+    let shader = edit.finish();
+    // Inputs are put in the order of their names.
+    let arguments = shader.function(Stage::Fragment).into_iter();
+    let arguments =
+        arguments.flat_map(|function| function.arguments.iter().skip(old.arguments.len()));
+    let place = |argument: &FunctionArgument| {
+        let mut gradients = front.gradients.iter();
+        gradients.position(|(name, _)| argument.name.as_ref() == Some(name))
+    };
+    let inputs = arguments.filter_map(place).collect();
     Ok(Some(Explicit {
-        shader: edit.finish(),
+        shader,
+        inputs,
         front,
     }))
 }

@@ -37,6 +37,8 @@ pub(crate) struct PerPixel {
     pub(crate) levels: Vec<EmitLevel>,
     /// What computes gradients for the original and each level, where they derive something.
     fronts: Vec<Option<Front>>,
+    /// For each, which gradients its function takes, in order.
+    inputs: Vec<Vec<usize>>,
     /// For the original and each level, the function of its front, the struct that it returns, and the variable.
     names: Vec<[String; 3]>,
 }
@@ -86,6 +88,7 @@ impl PerPixel {
              let {value} = 0.5 * log2(min(dot({across}, {across}), dot({down}, {down})) / {square:e});\n"
         );
         let mut fronts = Vec::new();
+        let mut inputs = Vec::new();
         let mut of_all = Vec::new();
         let mut made = Vec::new();
         let shaders = std::iter::once(base).chain(levels.iter().map(|level| &level.shader));
@@ -97,10 +100,11 @@ impl PerPixel {
                 names.take(&format!("{}Gradients", in_capitals(name))),
                 take(&format!("of_{name}")),
             ];
-            let (shader, front) = match found {
-                Some(explicit) => (Some(explicit.shader), Some(explicit.front)),
-                None => (None, None),
+            let (shader, front, taken) = match found {
+                Some(explicit) => (Some(explicit.shader), Some(explicit.front), explicit.inputs),
+                None => (None, None, Vec::new()),
             };
+            inputs.push(taken);
             let is_called = at > 0 || super::at_zero(levels).0.is_none();
             if front.is_some() && is_called {
                 before += &format!("let {} = {};\n", called[2], fragment.call(&called[0], &[]));
@@ -124,6 +128,7 @@ impl PerPixel {
             original,
             levels: levels.collect(),
             fronts,
+            inputs,
             names: of_all,
         }))
     }
@@ -131,8 +136,9 @@ impl PerPixel {
     /// The arguments of the function of the original or of a level behind the entry point's own.
     pub(crate) fn arguments(&self, at: usize, members: &[Vec<String>]) -> Vec<String> {
         let [_, _, variable] = &self.names[at];
-        let members = members[at].iter();
-        members
+        let taken = self.inputs[at].iter();
+        taken
+            .filter_map(|gradient| members[at].get(*gradient))
             .map(|member| format!("{variable}.{member}"))
             .collect()
     }
