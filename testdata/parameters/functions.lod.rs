@@ -42,8 +42,8 @@ pub struct LodParameters {
 
 impl LodParameters {
     /// What the buffer holds, in the order of bytes that GPUs have.
-    #[allow(dead_code, unreachable_pub)]
-    pub fn to_bytes(&self) -> [u8; 256] {
+    #[allow(clippy::all, clippy::pedantic, dead_code, unreachable_pub)]
+    pub fn to_bytes(self) -> [u8; 256] {
         let mut bytes = [0; 256];
         wgsl::put(&mut bytes, 0, self.angles.map(f32::to_bits));
         wgsl::put(&mut bytes, 16, self.areas.map(f32::to_bits));

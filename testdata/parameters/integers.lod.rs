@@ -28,8 +28,8 @@ pub struct LodParameters {
 
 impl LodParameters {
     /// What the buffer holds, in the order of bytes that GPUs have.
-    #[allow(dead_code, unreachable_pub)]
-    pub fn to_bytes(&self) -> [u8; 64] {
+    #[allow(clippy::all, clippy::pedantic, dead_code, unreachable_pub)]
+    pub fn to_bytes(self) -> [u8; 64] {
         let mut bytes = [0; 64];
         wgsl::put(&mut bytes, 0, self.all_of_it.map(f32::to_bits));
         wgsl::put(&mut bytes, 16, [self.return_float].map(f32::to_bits));

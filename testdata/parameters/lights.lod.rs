@@ -57,8 +57,8 @@ pub struct LodParameters {
 
 impl LodParameters {
     /// What the buffer holds, in the order of bytes that GPUs have.
-    #[allow(dead_code, unreachable_pub)]
-    pub fn to_bytes(&self) -> [u8; 48] {
+    #[allow(clippy::all, clippy::pedantic, dead_code, unreachable_pub)]
+    pub fn to_bytes(self) -> [u8; 48] {
         let mut bytes = [0; 48];
         wgsl::put(&mut bytes, 0, [self.return_div].map(f32::to_bits));
         wgsl::put(&mut bytes, 16, self.towards.map(f32::to_bits));

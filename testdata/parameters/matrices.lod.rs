@@ -46,8 +46,8 @@ pub struct LodParameters {
 
 impl LodParameters {
     /// What the buffer holds, in the order of bytes that GPUs have.
-    #[allow(dead_code, unreachable_pub)]
-    pub fn to_bytes(&self) -> [u8; 16] {
+    #[allow(clippy::all, clippy::pedantic, dead_code, unreachable_pub)]
+    pub fn to_bytes(self) -> [u8; 16] {
         let mut bytes = [0; 16];
         wgsl::put(&mut bytes, 0, [self.return_dot].map(f32::to_bits));
         wgsl::put(&mut bytes, 8, self.tilted.map(f32::to_bits));

@@ -18,14 +18,14 @@ use crate::{Diagnostic, Result};
 use function::{Body, Shared};
 use lodc_passes::operands;
 use naga::{
-    AddressSpace, EntryPoint, Expression, Function, GlobalVariable, Handle, Module, Statement,
-    StorageAccess, TypeInner,
+    AddressSpace, EntryPoint, Expression, Function, GlobalVariable, Handle, Module, ScalarKind,
+    Statement, StorageAccess, TypeInner,
 };
 use prelude::{MODULE, Prelude};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use text::rust_name;
-use types::Types;
+use types::{Numbers, Types};
 
 /// What is written, or what there is no form for.
 type Written<T> = std::result::Result<T, String>;
@@ -165,22 +165,21 @@ fn function(
 fn bytes(shared: &mut Shared<'_>, block: &str, ty: Handle<naga::Type>) -> Written<String> {
     let (members, size) = shared.types.numbers(ty)?;
     let mut lines = String::new();
-    for (name, offset, count) in members {
+    for Numbers {
+        name,
+        offset,
+        count,
+        kind,
+    } in members
+    {
         shared.prelude.known("put")?;
-        let kind = match shared.types.inner(ty) {
-            TypeInner::Struct { members, .. } => members
-                .iter()
-                .find(|member| member.offset == offset)
-                .and_then(|member| shared.types.inner(member.ty).scalar_kind()),
-            _ => None,
-        };
         let whole = match count {
             1 => format!("[self.{name}]"),
             _ => format!("self.{name}"),
         };
         let words = match kind {
-            Some(naga::ScalarKind::Float) => format!("{whole}.map(f32::to_bits)"),
-            Some(naga::ScalarKind::Sint) => format!("{whole}.map(|x| x as u32)"),
+            ScalarKind::Float => format!("{whole}.map(f32::to_bits)"),
+            ScalarKind::Sint => format!("{whole}.map(|x| x as u32)"),
             _ => whole,
         };
         writeln!(
@@ -191,7 +190,7 @@ fn bytes(shared: &mut Shared<'_>, block: &str, ty: Handle<naga::Type>) -> Writte
     }
     Ok(format!(
         "\nimpl {block} {{\n    /// What the buffer holds, in the order of bytes that GPUs have.\n    \
-         #[allow(dead_code, unreachable_pub)]\n    pub fn to_bytes(&self) -> [u8; {size}] {{\n        \
+         #[allow(clippy::all, clippy::pedantic, dead_code, unreachable_pub)]\n    pub fn to_bytes(self) -> [u8; {size}] {{\n        \
          let mut bytes = [0; {size}];\n{lines}        bytes\n    }}\n}}\n"
     ))
 }

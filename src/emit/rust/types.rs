@@ -294,23 +294,35 @@ impl<'a> Types<'a> {
         }
     }
 
-    /// The numbers of a structure of scalars and vectors: the name of each member, its place in bytes, how many it has,
-    /// and the structure's size.
-    pub(super) fn numbers(&self, ty: Handle<Type>) -> Written<(Vec<(String, u32, usize)>, u32)> {
+    /// The members of a structure of scalars and vectors, and its size in bytes.
+    pub(super) fn numbers(&self, ty: Handle<Type>) -> Written<(Vec<Numbers>, u32)> {
         let TypeInner::Struct { members, span } = self.inner(ty) else {
             return Err("a structure that is none".into());
         };
         let all = members.iter().map(|member| {
-            let count = match self.inner(member.ty) {
-                TypeInner::Scalar(_) => 1,
-                TypeInner::Vector { size, .. } => *size as usize,
+            let (count, scalar) = match self.inner(member.ty) {
+                TypeInner::Scalar(scalar) => (1, scalar),
+                TypeInner::Vector { size, scalar } => (*size as usize, scalar),
                 _ => return Err("a parameter that is no number".to_owned()),
             };
-            let name = rust_name(member.name.as_deref().unwrap_or("unnamed"));
-            Ok((name, member.offset, count))
+            Ok(Numbers {
+                name: rust_name(member.name.as_deref().unwrap_or("unnamed")),
+                offset: member.offset,
+                count,
+                kind: scalar.kind,
+            })
         });
         Ok((all.collect::<Written<_>>()?, *span))
     }
+}
+
+/// A scalar or vector that is a member of a structure.
+pub(super) struct Numbers {
+    pub(super) name: String,
+    /// In bytes.
+    pub(super) offset: u32,
+    pub(super) count: usize,
+    pub(super) kind: ScalarKind,
 }
 
 /// The type of a scalar, a vector or a matrix as a value; nothing for others.
