@@ -161,12 +161,17 @@ impl Emitted {
             files
         };
         let (files, uniform) = (form(Form::Files), form(Form::Uniform));
+        // Parameters stand beside it as Rust.
+        let is_shader = |(name, _): &&(PathBuf, Vec<u8>)| {
+            name.extension()
+                .is_some_and(|extension| extension == "wgsl")
+        };
         let levels = compiled.report.levels.iter().skip(1);
         Self {
             whole: parsed(&compiled.files[0]),
             scene: path.with_extension("toml"),
             uniform: parsed(&uniform[0]),
-            files: files.iter().map(parsed).collect(),
+            files: files.iter().filter(is_shader).map(parsed).collect(),
             // A threshold is an f32 in the shader.
             levels: levels
                 .map(|level| (f64::from(level.autolod as f32), level.distance))
@@ -236,8 +241,13 @@ impl Emitted {
             apart.add(scene, &by_uniform(*auto_lod), &by_gpu);
             wrong.extend(apart.judge(&format!("{what}, by a uniform"), ROUNDED));
             let mut apart = Apart::default();
-            let file = pipeline(&renderer, stages(file), scene);
-            let file = drawn(&mut renderer, &file, scene, &near);
+            // The scene as it is for what this file reads.
+            let (_, of_file) =
+                Scene::read_both(source, file, Some(&self.scene)).unwrap_or_else(|e| panic!("{e}"));
+            let near_file = of_file.frames(scene.distances[0]).swap_remove(0);
+            let file = Stages::of_source(file, &of_file).expect("it has both stages");
+            let file = pipeline(&renderer, file, &of_file);
+            let file = drawn(&mut renderer, &file, &of_file, &near_file);
             apart.add(scene, &file, &by_gpu);
             wrong.extend(apart.judge(&format!("{what}, in a file of its own"), ROUNDED));
             let (mut by_gpu, mut by_evaluator) = (Error::default(), Error::default());
