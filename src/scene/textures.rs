@@ -266,6 +266,31 @@ pub(super) fn resolve(
             true => place.source.texture(name)?,
             false => ImageAnswer::Unknown,
         };
+        let made = match is_asked && answer == ImageAnswer::Unknown {
+            true => generated_file(source, name),
+            false => None,
+        };
+        if let Some((file, bytes)) = made {
+            let file = file.display().to_string();
+            found.inputs.push((file.clone(), hash(&bytes)));
+            let texture = generated::read(&file, &bytes)?;
+            if texture.dimension() != kind.dimension {
+                return Err(Diagnostic::error(format!(
+                    "`{file}` is no image for the texture `{name}`"
+                ))
+                .with_note("make it again: run lodc on the shader that it belongs to"));
+            }
+            found.textures.push(SceneTexture {
+                name: name.clone(),
+                group: binding.group,
+                binding: binding.binding,
+                images: vec![Arc::new(texture)],
+                dynamic: false,
+                slopes: Vec::new(),
+                files: Vec::new(),
+            });
+            continue;
+        }
         let dynamic = match entry.map(|e| e.get_ref()) {
             Some(Node::Text(text)) => text == "dynamic",
             Some(_) => false,
@@ -273,27 +298,6 @@ pub(super) fn resolve(
             None if of_model => false,
             None if matches!(answer, ImageAnswer::Pixels(_)) => false,
             None if answer == ImageAnswer::Dynamic => true,
-            None if let Some((file, bytes)) = generated_file(source, name) => {
-                let file = file.display().to_string();
-                found.inputs.push((file.clone(), hash(&bytes)));
-                let texture = generated::read(&file, &bytes)?;
-                if texture.dimension() != kind.dimension {
-                    return Err(Diagnostic::error(format!(
-                        "`{file}` is no image for the texture `{name}`"
-                    ))
-                    .with_note("make it again: run lodc on the shader that it belongs to"));
-                }
-                found.textures.push(SceneTexture {
-                    name: name.clone(),
-                    group: binding.group,
-                    binding: binding.binding,
-                    images: vec![Arc::new(texture)],
-                    dynamic: false,
-                    slopes: Vec::new(),
-                    files: Vec::new(),
-                });
-                continue;
-            }
             None => {
                 found
                     .warnings
