@@ -13,6 +13,7 @@
 //! // facts: fixed material.flags 5                     stated by the scene; a float has a point
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
 //! // facts: sampler tiled repeats                       along both axes
+//! // facts: texture sky harmonics 1                     smooth: near such a sum, of 0.5, 0.25, 0.125 and so on
 //! ```
 //!
 //! The facts are those of [`synthetic`] otherwise. `LODC_BLESS=1 cargo test --test golden` writes the golden
@@ -27,7 +28,8 @@ use fixtures::Goldens;
 use lodc::compile::normal_form;
 use lodc::emit::{self, EmitLevel, Form, Output};
 use lodc::front::Source;
-use lodc_passes::facts::{Facts, ValueFacts};
+use lodc_passes::basis::Basis;
+use lodc_passes::facts::{Facts, Fit, ValueFacts};
 use lodc_passes::{Pass, Shader, Stage, ValueId, all_passes, specialize};
 use std::fmt::Write as _;
 use std::fs;
@@ -73,6 +75,15 @@ fn parameters_are_written_as_rust_as_the_goldens_say() {
         goldens.compare(&name, &path.with_extension("lod.rs"), &written);
     }
     goldens.finish();
+}
+
+fn basis(word: &str, degree: &str) -> Option<Basis> {
+    let degree = degree.parse().ok()?;
+    match word {
+        "polynomial" => Some(Basis::Polynomial(degree)),
+        "harmonics" => Some(Basis::Harmonics(degree)),
+        _ => None,
+    }
 }
 
 /// The golden text of a fixture, and how many candidates it has.
@@ -169,6 +180,20 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
             ["sampler", name, "repeats"] => {
                 facts.repeating.insert(name.into());
                 Some(())
+            }
+            ["texture", name, word, degree] => {
+                let fit = basis(word, degree).map(|basis| Fit {
+                    basis,
+                    numbers: (0..basis.count())
+                        .map(|i| [0.5_f32.powi(1 + i as i32); 4])
+                        .collect(),
+                    left: 0.125,
+                });
+                facts
+                    .textures
+                    .get_mut(name)
+                    .zip(fit)
+                    .map(|(texture, fit)| texture.fits.push(fit))
             }
             ["dynamic", path] => {
                 facts.dynamic.insert(path.into());

@@ -3,6 +3,7 @@
 //! Facts are data. Passes read them when they list candidates and bake what they use into the
 //! candidate, so that a recipe replays without them.
 
+use crate::basis::Basis;
 use crate::recipe::Declined;
 use crate::shader::ValueId;
 use std::collections::{BTreeMap, BTreeSet};
@@ -211,6 +212,17 @@ fn at_level<const N: usize>(levels: &[[f32; N]], level: f32) -> Option<[f32; N]>
     Some(mixed)
 }
 
+/// A sum of functions of a texture's coordinates that is as near to the texture as such a sum can be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// The functions.
+    pub basis: Basis,
+    /// What each of them is multiplied with, for each channel.
+    pub numbers: Vec<[f32; 4]>,
+    /// The part of the texture's variance that it leaves, 0..=1.
+    pub left: f64,
+}
+
 /// What is known of the image behind a texture. Colours are linear, as a sample returns them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextureFacts {
@@ -223,6 +235,8 @@ pub struct TextureFacts {
     /// For a map of normals in tangent space, the variance of their slopes along each axis at each MIP level; empty for
     /// any other texture.
     pub slopes: Vec<[f32; 2]>,
+    /// Sums of functions of its coordinates that are near it, simplest first; empty where nobody looked for them.
+    pub fits: Vec<Fit>,
     /// The MIP level that a sample at the facts' distance falls on, when it is known.
     pub level: f32,
 }

@@ -6,6 +6,7 @@
 //! This crate reads no files, starts no threads and knows no GPU.
 
 pub mod autolod;
+pub mod basis;
 mod constants;
 pub mod cost;
 pub mod edit;
@@ -17,6 +18,7 @@ pub mod generated;
 pub mod goal;
 pub mod gradients;
 mod interface;
+pub mod least_squares;
 mod live;
 pub mod normalize;
 pub mod op_removal;

@@ -13,6 +13,7 @@ use crate::eval::texture::{Comparison, Dimension, Sampler, Texture, Wrap};
 use crate::front::names::{listed, words};
 use crate::front::{Source, hash, similar_file};
 use crate::{Diagnostic, Result};
+use lodc_passes::facts::Fit;
 use naga::{Expression, GlobalVariable, Handle, ImageClass, ImageDimension, ScalarKind, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -36,6 +37,8 @@ pub struct SceneTexture {
     /// Of a map of normals, which the scene or its name says that it is, the variance of its slopes at each MIP level
     /// (see [`Texture::slopes`]); empty for any other texture, and where images differ.
     pub slopes: Vec<[f32; 2]>,
+    /// Sums of functions of its coordinates that are near its image (see [`Texture::fits`]); empty where images differ.
+    pub fits: Vec<Fit>,
     /// The files of its image, as the scene names them.
     pub files: Vec<String>,
 }
@@ -287,6 +290,7 @@ pub(super) fn resolve(
                 images: vec![Arc::new(texture)],
                 dynamic: false,
                 slopes: Vec::new(),
+                fits: Vec::new(),
                 files: Vec::new(),
             });
             continue;
@@ -348,6 +352,10 @@ pub(super) fn resolve(
             [image] if normals => image.slopes(),
             _ => Vec::new(),
         };
+        let fits = match &images[..] {
+            [image] if !dynamic => image.fits(),
+            _ => Vec::new(),
+        };
         found.textures.push(SceneTexture {
             name: name.clone(),
             group: binding.group,
@@ -355,6 +363,7 @@ pub(super) fn resolve(
             images,
             dynamic,
             slopes,
+            fits,
             files,
         });
     }

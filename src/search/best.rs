@@ -9,6 +9,7 @@
 use super::interval::Interval;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet};
+use lodc_passes::least_squares::LeastSquares;
 use lodc_passes::{Candidate, Shader, recipe};
 use rayon::prelude::*;
 
@@ -100,25 +101,30 @@ fn step(
         moved[i] += forward;
         programs.push(Programs::of(&made(&moved)?.1).ok()?);
     }
-    let mut normal = Normal::new(numbers.len());
+    let mut normal = LeastSquares::new(numbers.len());
     for set in interval.sets() {
         linearise(set, &programs, &forward, &mut normal);
     }
-    normal.solve()
+    normal.solve(DAMPING)
 }
 
 /// Adds what a set of samples shows to the normal equations. The first program has the numbers as they are, each
 /// other one has one of them moved forward.
-fn linearise(set: &SampleSet<'_>, programs: &[Programs], forward: &[f32], normal: &mut Normal) {
+fn linearise(
+    set: &SampleSet<'_>,
+    programs: &[Programs],
+    forward: &[f32],
+    normal: &mut LeastSquares,
+) {
     let output = set.stand.scene.output;
     // As much as each squared difference has in the load.
     let weight = set.load_of_square().sqrt();
-    let sums: Vec<Normal> = set
+    let sums: Vec<LeastSquares> = set
         .frames
         .par_iter()
         .map(|frame| {
             let differences = frame.differences(programs, output);
-            let mut normal = Normal::new(forward.len());
+            let mut normal = LeastSquares::new(forward.len());
             let mut slopes = vec![0.0; forward.len()];
             let [here, moved @ ..] = &differences[..] else {
                 return normal;
@@ -129,7 +135,7 @@ fn linearise(set: &SampleSet<'_>, programs: &[Programs], forward: &[f32], normal
                         let moved = moved[pixel][channel] - here;
                         *slope = weight * f64::from(moved) / f64::from(*forward);
                     }
-                    normal.add(&slopes, weight * f64::from(*here));
+                    normal.add(&slopes, -weight * f64::from(*here));
                 }
             }
             normal
@@ -137,76 +143,6 @@ fn linearise(set: &SampleSet<'_>, programs: &[Programs], forward: &[f32], normal
         .collect();
     for sum in &sums {
         normal.merge(sum);
-    }
-}
-
-/// The normal equations of a least-squares problem.
-struct Normal {
-    /// Row by row.
-    matrix: Vec<Vec<f64>>,
-    right: Vec<f64>,
-}
-
-impl Normal {
-    fn new(count: usize) -> Self {
-        Self {
-            matrix: vec![vec![0.0; count]; count],
-            right: vec![0.0; count],
-        }
-    }
-
-    /// Takes in one difference and how it changes with each unknown.
-    fn add(&mut self, slopes: &[f64], difference: f64) {
-        for ((row, right), slope) in self.matrix.iter_mut().zip(&mut self.right).zip(slopes) {
-            for (cell, other) in row.iter_mut().zip(slopes) {
-                *cell += slope * other;
-            }
-            *right -= slope * difference;
-        }
-    }
-
-    fn merge(&mut self, other: &Self) {
-        for (row, more) in self.matrix.iter_mut().zip(&other.matrix) {
-            for (cell, more) in row.iter_mut().zip(more) {
-                *cell += more;
-            }
-        }
-        for (right, more) in self.right.iter_mut().zip(&other.right) {
-            *right += more;
-        }
-    }
-
-    /// The unknowns, damped; nothing when no difference depends on them.
-    fn solve(mut self) -> Option<Vec<f64>> {
-        let count = self.right.len();
-        let trace: f64 = (0..count).map(|i| self.matrix[i][i]).sum();
-        if trace.is_nan() || trace <= 0.0 {
-            return None;
-        }
-        for i in 0..count {
-            self.matrix[i][i] += DAMPING * trace / count as f64;
-        }
-        // Symmetric and positive, so that no pivot is 0.
-        for i in 0..count {
-            for j in i + 1..count {
-                let factor = self.matrix[j][i] / self.matrix[i][i];
-                for k in i..count {
-                    self.matrix[j][k] -= factor * self.matrix[i][k];
-                }
-                self.right[j] -= factor * self.right[i];
-            }
-        }
-        let mut unknowns = vec![0.0; count];
-        for i in (0..count).rev() {
-            let known: f64 = (i + 1..count)
-                .map(|k| self.matrix[i][k] * unknowns[k])
-                .sum();
-            unknowns[i] = (self.right[i] - known) / self.matrix[i][i];
-        }
-        unknowns
-            .iter()
-            .all(|unknown: &f64| unknown.is_finite())
-            .then_some(unknowns)
     }
 }
 
@@ -218,27 +154,6 @@ mod tests {
     use crate::front::Source;
     use crate::scene::Scene;
     use crate::search::{Samples, Stand};
-
-    #[test]
-    fn normal_equations_give_the_least_squares_and_leave_alone_what_nothing_shows() {
-        let mut normal = Normal::new(2);
-        // A line through (0, 1), (1, 3) and (2, 5), from a start at 0.
-        for (x, y) in [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)] {
-            normal.add(&[x, 1.0], -y);
-        }
-        let line = normal.solve().expect("it has a solution");
-        assert!(
-            (line[0] - 2.0).abs() < 0.01 && (line[1] - 1.0).abs() < 0.01,
-            "{line:?}"
-        );
-        let mut blind = Normal::new(2);
-        blind.add(&[2.0, 0.0], 1.0);
-        let step = blind.solve().expect("the first is seen");
-        assert!((step[0] + 0.5).abs() < 0.01 && step[1] == 0.0, "{step:?}");
-        let mut dark = Normal::new(1);
-        dark.add(&[0.0], 1.0);
-        assert!(dark.solve().is_none());
-    }
 
     #[test]
     fn the_best_constant_leaves_less_error_than_the_mean() {

@@ -234,6 +234,7 @@ fn texture_facts(
                 match texture.images.as_slice() {
                     [image] => TextureFacts {
                         slopes: texture.slopes.clone(),
+                        fits: texture.fits.clone(),
                         ..image.facts(level.max(0.0) as f32, weighed)
                     },
                     // Draws with different images share no mean; what the samples see of them does.
@@ -340,9 +341,9 @@ mod tests {
     use lodc_passes::recipe;
     use std::path::Path;
 
-    /// What `seen-mean` and `normal-to-roughness` of the normals of a material add to its squared error, each as it is
+    /// What `seen-mean` and another choice for the same texture of a material add to its squared error, each as it is
     /// listed and with its best numbers.
-    fn added(material: &Path, scene: &str, part: f64) -> [[f64; 2]; 2] {
+    fn added(material: &Path, scene: &str, part: f64, choice: &str) -> [[f64; 2]; 2] {
         let source = Source::read(material).expect("it parses");
         let path = material.with_extension("toml");
         let scene = Scene::resolve(&source, Some((&path, scene))).unwrap_or_else(|e| panic!("{e}"));
@@ -360,12 +361,12 @@ mod tests {
         let floor = interval.start().original().error.square();
         let candidates = recipe::candidates(&base, &facts);
         let mut all = candidates.iter();
-        let widening = all.find(|candidate| candidate.choice.starts_with("normal-to-roughness"));
-        let widening = widening.expect("the roughness is known");
+        let other = all.find(|candidate| candidate.choice.starts_with(choice));
+        let other = other.expect("it is listed");
         let mean = candidates
             .iter()
-            .find(|candidate| candidate.choice == "seen-mean" && candidate.site == widening.site);
-        [mean.expect("the mean is seen"), widening].map(|candidate| {
+            .find(|candidate| candidate.choice == "seen-mean" && candidate.site == other.site);
+        [mean.expect("the mean is seen"), other].map(|candidate| {
             let shader = recipe::apply(&base, candidate).expect("it applies");
             let listed = interval.measure(&shader).expect("it runs");
             let better = best(&interval, &base, candidate, &listed);
@@ -394,9 +395,25 @@ mod tests {
                     false => line,
                 });
             let scene: Vec<&str> = lines.collect();
-            let [mean, widened] = added(&path, &scene.join("\n"), 0.5);
+            let [mean, widened] = added(&path, &scene.join("\n"), 0.5, "normal-to-roughness");
             assert!(widened[1] < mean[1].min(mean[0]), "{mean:?} {widened:?}");
         }
+    }
+
+    #[test]
+    fn a_sum_of_harmonics_leaves_less_error_than_the_mean_of_its_surroundings() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let path = folder.join("car_paint.wgsl");
+        let scene = std::fs::read_to_string(path.with_extension("toml")).expect("it is there");
+        let lines = scene
+            .lines()
+            .map(|line| match line.starts_with("resolution") {
+                true => "resolution = [96, 96]",
+                false => line,
+            });
+        let scene: Vec<&str> = lines.collect();
+        let [mean, sum] = added(&path, &scene.join("\n"), 0.5, "harmonics");
+        assert!(sum[1] < 0.75 * mean[1].min(mean[0]), "{mean:?} {sum:?}");
     }
 
     #[test]
@@ -412,7 +429,12 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
         let scene =
             format!("object = {bottle:?}\nresolution = [96, 96]\nviews = {{ count = 2 }}\n");
-        let [mean, widened] = added(&folder.join("gltf_pbr.wgsl"), &scene, 0.5);
+        let [mean, widened] = added(
+            &folder.join("gltf_pbr.wgsl"),
+            &scene,
+            0.5,
+            "normal-to-roughness",
+        );
         assert!(widened[1] < mean[1].min(mean[0]), "{mean:?} {widened:?}");
     }
 }

@@ -68,6 +68,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
                         [0.0; 4],
                     ],
                     slopes: Vec::new(),
+                    fits: Vec::new(),
                     level: 0.5,
                 },
             );

@@ -2,6 +2,7 @@
 //!
 //! A texture is made of decoded [`Image`]s and read by blocks of lanes, see `sample`.
 
+mod fit;
 mod mip;
 mod placeholder;
 mod sample;

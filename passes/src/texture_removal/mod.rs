@@ -1,4 +1,4 @@
-//! texture-removal: a texture read becomes a constant.
+//! texture-removal: a texture read becomes a constant, or a short sum of functions of its coordinates.
 //!
 //! Precondition. The site is a read (`textureSample` and its kin, `textureLoad`) that returns f32 in
 //! the fragment stage, of a texture whose image is known, and nothing but the picture depends on it; or
@@ -22,6 +22,13 @@
 //! like those of a microfacet, most are flat with some steep edges, which a lobe had better not follow; and a
 //! shader may scale its normals. So a search judges this choice by its best numbers.
 //!
+//! `polynomial D` and `harmonics D`, for a texture that is smooth: a sample becomes a sum of functions of its
+//! coordinates, of a degree or band up to D, and never below 0. A polynomial takes the place of a texture of two dimensions,
+//! such as a table of a reflectance over two arguments; harmonics take that of a cube map, such as surroundings that light a
+//! rough surface. The candidate bakes the factors, function by function, of the components that are used. They are those
+//! that are nearest to the texture at first, and then those that leave the least error on the screen, which needs no
+//! window against ringing: what rings is an error.
+//!
 //! Error. For `texture-mean`, the least-squares error of the constant at that MIP level is the standard
 //! deviation of the texels: [`deviation`] gives it. Its effect on the picture is measured. `only-colour`
 //! is lossless, as weights of a filter that sum to 1 leave one colour what it is, but for rounding: it is of the exact tier, where
@@ -37,16 +44,21 @@
 //! - A read that decides when a loop ends (unless a counter of integers ends it anyway), a built-in
 //!   output or what is written to memory.
 //! - A read that no sample saw, for `seen-mean`.
+//! - `polynomial` for coordinates that are seen outside 0..1, both sums for what is seen below 0. They are not thought of for
+//!   textures of which they would leave most of the variance, and for reads other than plain samples.
 //! - `normal-to-roughness` where alpha is not known for sure or seen above 1, where it and the normals are not two
 //!   things that meet further on, where it decides more than the picture, and for normals that do not vary. It is not
 //!   thought of for other textures.
 //!
 //! This work is based on: Marc Olano, Bob Kuehne, Maryann Simmons, "Automatic Shader Level of Detail",
-//! 2003, section 2.1; Michael Toksvig, "Mipmapping Normal Maps", 2005; Marc Olano, Dan Baker, "LEAN Mapping", 2010,
+//! 2003, section 2.1; Ravi Ramamoorthi, Pat Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001;
+//! Michael Toksvig, "Mipmapping Normal Maps", 2005; Marc Olano, Dan Baker, "LEAN Mapping", 2010,
 //! section 3.
 
 mod roughness;
+mod smooth;
 
+use crate::basis::Basis;
 use crate::edit::{Edit, New};
 use crate::facts::TextureFacts;
 use crate::flow::{Dynamic, Flow, Value};
@@ -54,6 +66,7 @@ use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, constants};
 use naga::{Expression, GlobalVariable, Handle};
+use smooth::Sum;
 
 /// The stage whose reads are removed: textures that move vertices belong to the mesh.
 const STAGE: Stage = Stage::Fragment;
@@ -69,6 +82,7 @@ enum Choice {
     Best,
     OnlyColour,
     NormalToRoughness,
+    Smooth(Basis),
 }
 
 impl Choice {
@@ -83,6 +97,9 @@ impl Choice {
     /// A choice, and the ids of values that stand behind it.
     fn parse(choice: &str) -> Result<(Self, &str), Declined> {
         let (word, ids) = choice.split_once(' ').unwrap_or((choice, ""));
+        if let Some(basis) = Basis::parse(word, ids) {
+            return Ok((Self::Smooth(basis), ""));
+        }
         Self::ALL
             .iter()
             .find(|(_, known)| *known == word)
@@ -107,7 +124,7 @@ pub fn deviation(shader: &Shader, facts: &Facts, candidate: &Candidate) -> Optio
         return None;
     }
     match Choice::parse(&candidate.choice).ok()?.0 {
-        Choice::SeenMean | Choice::Best | Choice::NormalToRoughness => None,
+        Choice::SeenMean | Choice::Best | Choice::NormalToRoughness | Choice::Smooth(_) => None,
         Choice::OnlyColour => Some([0.0; 4]),
         Choice::TextureMean => {
             let (stage, site) = shader.find(&candidate.site)?;
@@ -127,7 +144,7 @@ impl Pass for TextureRemoval {
     }
 
     fn summary(&self) -> &'static str {
-        "a texture read becomes a constant"
+        "a texture read becomes a constant, or a sum of functions of its coordinates"
     }
 
     fn class(&self, candidate: &Candidate) -> Class {
@@ -181,6 +198,7 @@ impl Pass for TextureRemoval {
                 *variance = variance.max(0.0);
                 Some(candidate.with(&candidate.choice, &numbers))
             }
+            Choice::Smooth(_) => Some(candidate.with(&candidate.choice, numbers)),
             _ => Some(candidate.with(Choice::Best.word(), numbers)),
         }
     }
@@ -201,6 +219,10 @@ impl Pass for TextureRemoval {
                 for read in plan.reads {
                     edit.replace(read, New::Numbers(plan.numbers.clone()));
                 }
+                if let Some(sum) = plan.sum {
+                    let value = sum.write(shader, &mut edit);
+                    edit.replace(plan.site, New::Value(value));
+                }
                 for alpha in plan.alphas {
                     roughness::widen(&mut edit, shader, alpha, plan.variance);
                 }
@@ -213,7 +235,9 @@ impl Pass for TextureRemoval {
 
 /// What a candidate does.
 struct Plan {
-    /// What it removes.
+    /// What it is about.
+    site: Value,
+    /// What becomes a constant.
     reads: Vec<Value>,
     /// The constant that these become.
     numbers: Vec<f32>,
@@ -221,6 +245,8 @@ struct Plan {
     alphas: Vec<Value>,
     /// By how much.
     variance: f32,
+    /// What the site becomes.
+    sum: Option<Sum>,
 }
 
 fn plan(shader: &Shader, candidate: &Candidate) -> Result<Plan, Declined> {
@@ -242,6 +268,16 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<Plan, Declined> {
         }
     };
     let count = removable(&flow, &reads, choice)?;
+    if let Choice::Smooth(basis) = choice {
+        return Ok(Plan {
+            site,
+            reads: Vec::new(),
+            numbers: Vec::new(),
+            alphas: Vec::new(),
+            variance: 0.0,
+            sum: Some(Sum::new(&flow, site, basis, candidate)?),
+        });
+    }
     let (alphas, mut numbers) = match choice {
         Choice::NormalToRoughness => (roughness::named(&flow, ids)?, candidate.baked(1 + count)?),
         _ => (Vec::new(), candidate.baked(count)?),
@@ -255,10 +291,12 @@ fn plan(shader: &Shader, candidate: &Candidate) -> Result<Plan, Declined> {
     }
     follow(&flow, &reads, &numbers)?;
     Ok(Plan {
+        site,
         reads,
         numbers,
         alphas,
         variance,
+        sum: None,
     })
 }
 
@@ -385,6 +423,12 @@ impl Survey<'_> {
         };
         for choice in [Choice::SeenMean, of_texture] {
             consider(choice.word(), self.mean(choice, known, reads));
+        }
+        let mean = self.mean(Choice::SeenMean, known, reads);
+        if let (Some(known), [read], Ok(_)) = (known, reads, mean) {
+            for (basis, verdict) in smooth::listed(self.flow, self.facts, known, *read) {
+                consider(&basis.to_string(), verdict);
+            }
         }
         // The slopes of a map that is read in several places go once.
         let all =
