@@ -149,7 +149,7 @@ impl PerPixel {
         (base, levels): (&Shader, &[EmitLevel]),
         block: Option<&Block>,
         behind: &mut Behind<'_, '_>,
-    ) -> Result<std::result::Result<(String, Vec<Vec<String>>), Hidden>> {
+    ) -> Result<std::result::Result<Written, Hidden>> {
         let mut out = String::new();
         let mut all = Vec::new();
         let original = EmitLevel::original(base.clone());
@@ -179,6 +179,9 @@ impl PerPixel {
         Ok(Ok((out, all)))
     }
 }
+
+/// Text, and the members of the struct of each function in it.
+type Written = (String, Vec<Vec<String>>);
 
 /// `original_fs_main` as `OriginalFsMain`.
 fn in_capitals(name: &str) -> String {

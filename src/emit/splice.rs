@@ -198,7 +198,7 @@ fn spliced(
     for (at, level) in levels.iter().enumerate() {
         drawn.push((level.autolod, bodies[at].clone()));
         if let Some((bands, end)) = bands.as_ref().zip(band_end(levels, at, output)) {
-            let calls = [at, at + 1].map(|of| call(of));
+            let calls = [at, at + 1].map(&call);
             let before = at
                 .checked_sub(1)
                 .map_or(base, |before| &levels[before].shader);

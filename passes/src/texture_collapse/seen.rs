@@ -66,7 +66,10 @@ pub(super) fn sample(flow: &Flow, value: Value) -> Option<Sample> {
 }
 
 /// An affine function of the root for each component: what its two coordinates are multiplied by, and what is added.
-pub(super) type Rows = Vec<[f32; 3]>;
+pub(super) type Rows = Vec<Row>;
+
+/// A number as an affine function of the root: the factors of its two coordinates, and what is added.
+type Row = [f32; 3];
 
 /// What a value is, seen from a root.
 #[derive(Clone, Debug, PartialEq)]
@@ -265,7 +268,7 @@ fn rows(flow: &Flow, value: Value, of: &[Of]) -> Option<Rows> {
         _ => None,
     };
     let number = |x: f32| [0.0, 0.0, x];
-    let each = |f: &dyn Fn(&[f32; 3], &[f32; 3]) -> Option<[f32; 3]>, left: Value, right: Value| {
+    let each = |f: &dyn Fn(&Row, &Row) -> Option<Row>, left: Value, right: Value| {
         let (left, right) = (at(left)?, at(right)?);
         let part = |rows: &Rows, i: usize| rows[if rows.len() == 1 { 0 } else { i }];
         (0..count)

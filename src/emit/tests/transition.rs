@@ -165,7 +165,7 @@ const HOLES: &str = "\
 fn pixels_that_are_discarded_are_so_by_the_level_that_is_chosen() {
     let source = source(HOLES);
     // The level has its holes where the original has none.
-    let other = Source::parse("a.wgsl", &HOLES.replace("seen.x < 0.5", "seen.x >= 0.5"));
+    let other = Source::parse("a.wgsl", HOLES.replace("seen.x < 0.5", "seen.x >= 0.5"));
     let other = base(&other.unwrap_or_else(|e| panic!("{e}")));
     let levels = [EmitLevel {
         shader: other,
