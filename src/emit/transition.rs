@@ -20,8 +20,8 @@ use crate::front::Source;
 use crate::front::identifiers::Names;
 use lodc_passes::{Shader, Stage, operands};
 use naga::{
-    Binding, Block, BuiltIn, Expression, Function, Module, SampleLevel, Scalar, ShaderStage, Span,
-    Statement, TypeInner,
+    Binding, Block, BuiltIn, Expression, Function, Module, SampleLevel, Scalar, ScalarKind,
+    ShaderStage, Span, Statement, TypeInner,
 };
 use std::collections::BTreeSet;
 
@@ -55,6 +55,7 @@ pub(crate) struct Bands {
     whole: Vec<String>,
     near: String,
     far: String,
+    chosen: String,
     near_gone: String,
     far_gone: String,
 }
@@ -62,7 +63,8 @@ pub(crate) struct Bands {
 /// What a fragment stage returns.
 enum Shown {
     Nothing,
-    Value,
+    /// A number or a vector, of this type.
+    Value(String),
     /// A struct of this name, with these members.
     Struct(String, Vec<String>),
 }
@@ -98,6 +100,7 @@ impl Bands {
         let mut take = |wish: &str| local.take_local(wish, &BTreeSet::new());
         let (near, far) = (take("near"), take("far"));
         let (near_gone, far_gone) = (take("near_gone"), take("far_gone"));
+        let chosen = take("chosen");
         let place = position_of(module, entry, &fragment.arguments);
         let dithers = output.transition == Transition::Dither;
         let (position, parameter) = match place {
@@ -110,6 +113,12 @@ impl Bands {
         };
         // Each pixel's gradients are known in front of the branch there.
         let branches = output.per_pixel.is_some();
+        let shown = shown(module, entry);
+        if let Shown::Value(ty) = &shown
+            && let Some(hidden) = body.hides(ty)
+        {
+            return Ok(Err(hidden));
+        }
         let whole = dithers
             && !branches
             && discards(module, entry).is_some()
@@ -118,7 +127,7 @@ impl Bands {
         Ok(Ok(Some(Self {
             kind: output.transition,
             branches,
-            shown: shown(module, entry),
+            shown,
             position,
             parameter,
             door: match dithers {
@@ -131,6 +140,7 @@ impl Bands {
                 .collect(),
             near,
             far,
+            chosen,
             near_gone,
             far_gone,
         })))
@@ -159,7 +169,7 @@ impl Bands {
         if self.kind == Transition::Blend {
             return match &self.shown {
                 Shown::Nothing => format!("{after};\nreturn;"),
-                Shown::Value => format!("return mix({before}, {after}, {share});"),
+                Shown::Value(_) => format!("return mix({before}, {after}, {share});"),
                 Shown::Struct(name, members) => {
                     let share_name = format!("{near}_to_{far}");
                     let mixed = members.iter().map(|member| {
@@ -173,9 +183,16 @@ impl Bands {
             };
         }
         let test = format!("{}({}, {share})", self.door, self.position);
-        if let Shown::Nothing = self.shown {
-            return format!("if {test} {{ {after}; return; }}\n{before};\nreturn;");
-        }
+        // No return is chosen by pixels: what is behind it would not be uniform any more, and take no derivatives.
+        let ty = match &self.shown {
+            Shown::Nothing => {
+                return format!(
+                    "if {test} {{\n    {after};\n}} else {{\n    {before};\n}}\nreturn;"
+                );
+            }
+            Shown::Value(ty) | Shown::Struct(ty, _) => ty,
+        };
+        let chosen = &self.chosen;
         if let (Some(gone), [_, ..]) = (&self.gone, &self.whole[..]) {
             // Both are drawn to the end, as derivatives want it; then one decides whether the pixel is there.
             let (near_gone, far_gone) = (&self.near_gone, &self.far_gone);
@@ -185,7 +202,8 @@ impl Bands {
             };
             return format!(
                 "let {near} = {};\nlet {near_gone} = {gone};\n{gone} = false;\nlet {far} = {};\nlet {far_gone} = {gone};\n\
-                 if {test} {{\n    if {far_gone} {{ discard; }}\n    return {far};\n}}\nif {near_gone} {{ discard; }}\nreturn {near};",
+                 var {chosen} = {near};\n{gone} = {near_gone};\nif {test} {{\n    {chosen} = {far};\n    {gone} = {far_gone};\n}}\n\
+                 if {gone} {{ discard; }}\nreturn {chosen};",
                 swapped(before, at),
                 swapped(after, at + 1),
             );
@@ -198,9 +216,11 @@ impl Bands {
                 function.is_some_and(|function| takes_derivatives(level.module(), function))
             });
         match derives && !self.branches {
-            false => format!("if {test} {{ return {after}; }}\nreturn {before};"),
+            false => format!(
+                "var {chosen}: {ty};\nif {test} {{\n    {chosen} = {after};\n}} else {{\n    {chosen} = {before};\n}}\nreturn {chosen};"
+            ),
             true => format!(
-                "let {near} = {before};\nlet {far} = {after};\nif {test} {{ return {far}; }}\nreturn {near};"
+                "let {near} = {before};\nlet {far} = {after};\nvar {chosen} = {near};\nif {test} {{ {chosen} = {far}; }}\nreturn {chosen};"
             ),
         }
     }
@@ -293,18 +313,36 @@ fn fragment_entry<'m>(module: &'m Module, name: &str) -> Option<&'m Function> {
 }
 
 fn shown(module: &Module, entry: &Function) -> Shown {
-    match &entry.result {
-        None => Shown::Nothing,
-        Some(result) => match &module.types[result.ty] {
-            naga::Type {
-                name: Some(name),
-                inner: TypeInner::Struct { members, .. },
-            } => {
-                let members = members.iter().filter_map(|member| member.name.clone());
-                Shown::Struct(name.clone(), members.collect())
-            }
-            _ => Shown::Value,
-        },
+    let Some(result) = &entry.result else {
+        return Shown::Nothing;
+    };
+    match &module.types[result.ty] {
+        naga::Type {
+            name: Some(name),
+            inner: TypeInner::Struct { members, .. },
+        } => {
+            let members = members.iter().filter_map(|member| member.name.clone());
+            Shown::Struct(name.clone(), members.collect())
+        }
+        naga::Type { inner, .. } => Shown::Value(type_of_numbers(inner)),
+    }
+}
+
+/// The type of a number or a vector, as WGSL writes it.
+fn type_of_numbers(inner: &TypeInner) -> String {
+    let word = |scalar: Scalar| match scalar.kind {
+        ScalarKind::Sint => "i",
+        ScalarKind::Uint => "u",
+        _ if scalar.width == 2 => "h",
+        _ => "f",
+    };
+    match *inner {
+        TypeInner::Vector { size, scalar } => format!("vec{}{}", size as u8, word(scalar)),
+        TypeInner::Scalar(scalar) => {
+            format!("{}{}", word(scalar).replace('h', "f"), 8 * scalar.width)
+        }
+        // A stage returns nothing else.
+        _ => "vec4f".to_owned(),
     }
 }
 

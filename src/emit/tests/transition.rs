@@ -71,8 +71,9 @@ fn a_screen_door_asks_for_the_place_of_the_pixel() {
         "\
         let near = original_fs_main(uv0);
         let far = lod_one_fs_main(uv0);
-        if screen_door(pixel_position, (level_of_detail.autoLOD - 0.85) / 0.25) { return far; }
-        return near;
+        var chosen = near;
+        if screen_door(pixel_position, (level_of_detail.autoLOD - 0.85) / 0.25) { chosen = far; }
+        return chosen;
 ",
     );
 }
@@ -89,8 +90,13 @@ fn what_takes_no_derivatives_is_drawn_for_its_pixels_alone() {
     let text = text(PLAIN, banded(Transition::Dither));
     has(
         &text,
-        "        if screen_door(near.at, (level_of_detail.autoLOD - 0.85) / 0.25) { return lod_one_fs_main(near); }
-        return original_fs_main(near);
+        "        var chosen: Out;
+        if screen_door(near.at, (level_of_detail.autoLOD - 0.85) / 0.25) {
+            chosen = lod_one_fs_main(near);
+        } else {
+            chosen = original_fs_main(near);
+        }
+        return chosen;
 ",
     );
 }
