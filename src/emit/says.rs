@@ -47,6 +47,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
     let mut averaged = Vec::new();
     let mut branched = Vec::new();
     let mut baked = Vec::new();
+    let mut smooth = Vec::new();
     let mut others = Vec::new();
     for candidate in candidates {
         let site = short(candidate.site.path());
@@ -64,6 +65,8 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             }
             Some(("normal-to-roughness", _)) => widened.push(site),
             Some(("same" | "levels" | "resampled" | "bake", _)) => baked.push(site),
+            Some(("harmonics", _)) => smooth.push(format!("{site} replaced by harmonics")),
+            Some(("polynomial", _)) => smooth.push(format!("{site} replaced by a polynomial")),
             None if pass == "vertex-motion" => moved.push(site),
             None if candidate.choice == "exact" => per_draw.push(site),
             Some(("average", _)) => averaged.push(site),
@@ -87,6 +90,10 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             "{} replaced by constants",
             listed(several, "values")
         )),
+    }
+    match smooth.len() {
+        0..=2 => clauses.append(&mut smooth),
+        n => clauses.push(format!("{n} textures replaced by sums of functions")),
     }
     if !without.is_empty() {
         clauses.push(format!("{} left out", listed(&without, "values")));
@@ -167,6 +174,7 @@ mod tests {
                 "main.detail_normal",
                 "normal-to-roughness main.alpha#0123456789abcdef",
             ),
+            candidate("texture-removal", "main.dusk", "harmonics 2"),
             candidate("op-removal", "main.ambient", "without"),
             candidate("op-removal", "main.sky", "best"),
             candidate("op-removal", "main.pow", "fit main.cosine#0123456789abcdef"),
@@ -186,7 +194,7 @@ mod tests {
         ]);
         assert_eq!(
             says(&recipe, "main"),
-            "normal_map and albedo replaced by their means; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex; sheen in a branch; glow averaged per draw; tint per draw"
+            "normal_map and albedo replaced by their means; dusk replaced by harmonics; detail_normal removed, roughness widened; sky replaced by a constant; ambient left out; specular.mul keeps specular.pow; pow fitted to cosine; specular and sun per vertex; sheen in a branch; glow averaged per draw; tint per draw"
         );
         assert_eq!(says(&Recipe::default(), "main"), "nothing");
     }
