@@ -77,15 +77,6 @@ fn parameters_are_written_as_rust_as_the_goldens_say() {
     goldens.finish();
 }
 
-fn basis(word: &str, degree: &str) -> Option<Basis> {
-    let degree = degree.parse().ok()?;
-    match word {
-        "polynomial" => Some(Basis::Polynomial(degree)),
-        "harmonics" => Some(Basis::Harmonics(degree)),
-        _ => None,
-    }
-}
-
 /// The golden text of a fixture, and how many candidates it has.
 fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let fail = |e: &dyn std::fmt::Display| -> ! { panic!("{}: {e}", path.display()) };
@@ -182,7 +173,7 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                 Some(())
             }
             ["texture", name, word, degree] => {
-                let fit = basis(word, degree).map(|basis| Fit {
+                let fit = Basis::parse(word, degree).map(|basis| Fit {
                     basis,
                     numbers: (0..basis.count())
                         .map(|i| [0.5_f32.powi(1 + i as i32); 4])

@@ -5,7 +5,7 @@
 //! band are sums of such products up to a degree, and as x^2 + y^2 + z^2 = 1 those with z^2 are not needed.
 
 use crate::edit::Edit;
-use naga::{BinaryOperator, Expression, Handle, MathFunction, Scalar, TypeInner, VectorSize};
+use naga::{BinaryOperator, Expression, Handle, MathFunction};
 use std::fmt;
 
 /// The largest degree that there is.
@@ -29,7 +29,7 @@ impl fmt::Display for Basis {
 
 impl Basis {
     /// The one of these words, when there is such a one.
-    pub(crate) fn parse(word: &str, degree: &str) -> Option<Self> {
+    pub fn parse(word: &str, degree: &str) -> Option<Self> {
         let degree = degree.parse().ok().filter(|d| (1..=MOST).contains(d))?;
         [Self::Polynomial(degree), Self::Harmonics(degree)]
             .into_iter()
@@ -156,18 +156,6 @@ impl Basis {
         }
         written
     }
-}
-
-/// The type of as many floats.
-pub(crate) fn floats(count: usize) -> TypeInner {
-    let scalar = Scalar::F32;
-    let size = match count {
-        2 => VectorSize::Bi,
-        3 => VectorSize::Tri,
-        4 => VectorSize::Quad,
-        _ => return TypeInner::Scalar(scalar),
-    };
-    TypeInner::Vector { size, scalar }
 }
 
 #[cfg(test)]

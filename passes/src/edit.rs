@@ -16,8 +16,8 @@ use crate::semantics::{Constant, Shape};
 use crate::shader::{Shader, Stage, ValueId};
 use naga::{
     AddressSpace, Arena, Block, EntryPoint, Expression, Function, FunctionArgument, GlobalVariable,
-    Handle, Literal, LocalVariable, Module, ResourceBinding, Scalar, Span, Statement, Type,
-    TypeInner, VectorSize,
+    Handle, Literal, LocalVariable, Module, Range, ResourceBinding, Scalar, Span, Statement,
+    SwizzleComponent, Type, TypeInner, VectorSize,
 };
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -320,13 +320,10 @@ impl<'a> Edit<'a> {
     /// A new constant: of one number a float, of more a vector of them.
     pub(crate) fn add_numbers(&mut self, path: &str, numbers: &[f32]) -> Handle<Expression> {
         let literals: Vec<Literal> = numbers.iter().copied().map(Literal::F32).collect();
-        let size = match literals[..] {
-            [_, _] => VectorSize::Bi,
-            [_, _, _] => VectorSize::Tri,
-            [_, _, _, _] => VectorSize::Quad,
-            _ => return self.add(path, Expression::Literal(literals[0])),
-        };
-        self.constant_vector(path, size, Scalar::F32, &literals)
+        match vector_size(literals.len()) {
+            Some(size) => self.constant_vector(path, size, Scalar::F32, &literals),
+            None => self.add(path, Expression::Literal(literals[0])),
+        }
     }
 
     fn constant_vector(
@@ -710,6 +707,51 @@ fn nth<'b>(block: &'b mut Block, number: &mut usize) -> Option<&'b mut Statement
         }
     }
     None
+}
+
+/// The size of a vector of so many components; `None` of one.
+pub(crate) fn vector_size(components: usize) -> Option<VectorSize> {
+    match components {
+        2 => Some(VectorSize::Bi),
+        3 => Some(VectorSize::Tri),
+        4 => Some(VectorSize::Quad),
+        _ => None,
+    }
+}
+
+/// The type of so many floats.
+pub(crate) fn floats(components: usize) -> TypeInner {
+    let scalar = Scalar::F32;
+    match vector_size(components) {
+        Some(size) => TypeInner::Vector { size, scalar },
+        None => TypeInner::Scalar(scalar),
+    }
+}
+
+/// So many components of a vector, from one on.
+pub(crate) fn part(whole: Handle<Expression>, from: usize, count: usize) -> Expression {
+    match vector_size(count) {
+        None => Expression::AccessIndex {
+            base: whole,
+            index: from as u32,
+        },
+        Some(size) => Expression::Swizzle {
+            size,
+            vector: whole,
+            pattern: [0, 1, 2, 3].map(|at| SwizzleComponent::XYZW[(from + at).min(3)]),
+        },
+    }
+}
+
+/// Puts a value at the end of a function that is being made, computed there where it has to be.
+pub fn append(function: &mut Function, expression: Expression) -> Handle<Expression> {
+    let is_emitted = !expression.needs_pre_emit();
+    let value = function.expressions.append(expression, Span::UNDEFINED);
+    if is_emitted {
+        let range = Range::new_from_bounds(value, value);
+        function.body.push(Statement::Emit(range), Span::UNDEFINED);
+    }
+    value
 }
 
 /// Everything of a module but the function of one of its entry points.

@@ -5,6 +5,7 @@
 //! each becomes an input of the fragment stage, and the front, a function of the same inputs, computes those inputs where
 //! all pixels are together. Coordinates that depend on other samples bring them along.
 
+use crate::edit::append;
 use crate::live::keep_needed;
 use crate::operands;
 use crate::shader::{Shader, Stage, ValueId};
@@ -289,14 +290,11 @@ fn front(shader: &Shader, old: &Function, slots: &[Slot]) -> Result<Front, NotEx
     let mut function = old.clone();
     function.body = Block::new();
     function.result = None;
-    let emit = |function: &mut Function, value: Handle<Expression>| {
+    for value in needed {
         if !function.expressions[value].needs_pre_emit() {
             let range = naga::Range::new_from_bounds(value, value);
             function.body.push(Statement::Emit(range), Span::UNDEFINED);
         }
-    };
-    for value in needed {
-        emit(&mut function, value);
     }
     let mut gradients: Vec<(String, TypeInner)> = Vec::new();
     let mut components = Vec::new();
@@ -306,8 +304,7 @@ fn front(shader: &Shader, old: &Function, slots: &[Slot]) -> Result<Front, NotEx
             ctrl: slot.control,
             expr: slot.of,
         };
-        let value = function.expressions.append(derivative, Span::UNDEFINED);
-        emit(&mut function, value);
+        let value = append(&mut function, derivative);
         let path = shader.id(Stage::Fragment, slot.of).path();
         let end = match slot.axis {
             DerivativeAxis::X => "across",
@@ -329,8 +326,7 @@ fn front(shader: &Shader, old: &Function, slots: &[Slot]) -> Result<Front, NotEx
         return Err(NotExplicit { why, value });
     };
     let all = Expression::Compose { ty, components };
-    let all = function.expressions.append(all, Span::UNDEFINED);
-    emit(&mut function, all);
+    let all = append(&mut function, all);
     let end = Statement::Return { value: Some(all) };
     function.body.push(end, Span::UNDEFINED);
     let kept = keep_needed(&function);

@@ -10,7 +10,7 @@
 //! does what it does by itself. Both variables are one buffer's; they have the bindings behind the author's last one.
 //! A member that no stage reads any more goes, with what computed it, and with the last member the block.
 
-use crate::edit::Edit;
+use crate::edit::{Edit, append};
 use crate::fingerprint::{Declared, of_function};
 use crate::interface::laid_out;
 use crate::live::keep_needed;
@@ -126,13 +126,13 @@ pub fn returned(module: &Module, entry: usize, stored: Handle<GlobalVariable>) -
     if !ends {
         return None;
     }
-    let base = add(function, Expression::GlobalVariable(stored));
+    let base = append(function, Expression::GlobalVariable(stored));
     let mut components = Vec::new();
     for index in 0..count {
-        let pointer = add(function, Expression::AccessIndex { base, index });
-        components.push(add(function, Expression::Load { pointer }));
+        let pointer = append(function, Expression::AccessIndex { base, index });
+        components.push(append(function, Expression::Load { pointer }));
     }
-    let value = Some(add(function, Expression::Compose { ty, components }));
+    let value = Some(append(function, Expression::Compose { ty, components }));
     let end = Statement::Return { value };
     function.body.push(end, Span::UNDEFINED);
     function.result = Some(FunctionResult { ty, binding: None });
@@ -140,17 +140,6 @@ pub fn returned(module: &Module, entry: usize, stored: Handle<GlobalVariable>) -
     point.stage = ShaderStage::Vertex;
     point.workgroup_size = [0; 3];
     Some(module)
-}
-
-/// Puts a value at the end of a function.
-fn add(function: &mut Function, expression: Expression) -> Handle<Expression> {
-    let is_emitted = !expression.needs_pre_emit();
-    let value = function.expressions.append(expression, Span::UNDEFINED);
-    if is_emitted {
-        let range = naga::Range::new_from_bounds(value, value);
-        function.body.push(Statement::Emit(range), Span::UNDEFINED);
-    }
-    value
 }
 
 /// The store of a parameter stage.
@@ -435,10 +424,10 @@ impl Shader {
         let mut function = old.clone();
         let last = function.body.len();
         function.body.cull(at..last);
-        let base = add(&mut function, Expression::GlobalVariable(variable));
+        let base = append(&mut function, Expression::GlobalVariable(variable));
         for place in places {
             let index = *place as u32;
-            let pointer = add(&mut function, Expression::AccessIndex { base, index });
+            let pointer = append(&mut function, Expression::AccessIndex { base, index });
             let value = *components.get(*place)?;
             let store = Statement::Store { pointer, value };
             function.body.push(store, Span::UNDEFINED);

@@ -34,7 +34,7 @@
 //! section 4.1; Rui Wang et al., "Automatic Shader Simplification using Surface Signal Approximation", 2014, section 4.
 
 use crate::cost::{self, FLAT_WEIGHT, INTERPOLATION_WEIGHT};
-use crate::edit::{Edit, New};
+use crate::edit::{Edit, New, floats, part};
 use crate::flow::{Flow, Value};
 use crate::interface::{self, Output, Roomy};
 use crate::rate::{Rate, Rates, Surface};
@@ -44,8 +44,7 @@ use crate::slice::{Around, Slice, Source};
 use crate::{Facts, Work, operands};
 use naga::{
     BinaryOperator as Op, Binding, Expression, FunctionArgument, Handle, ImageClass, Interpolation,
-    Literal, MathFunction as Math, SampleLevel, Statement, SwizzleComponent, Type, TypeInner,
-    UnaryOperator, VectorSize,
+    Literal, MathFunction as Math, SampleLevel, Statement, Type, TypeInner, UnaryOperator,
 };
 use std::collections::BTreeMap;
 
@@ -597,15 +596,7 @@ impl<'a> Study<'a> {
         let binding = interface::at(location, choice.interpolation(movable.surface));
         let own = flow.floats(site).unwrap_or(1);
         let components = own + before.map_or(0, |before| before.components);
-        let ty = |edit: &mut Edit<'_>| {
-            edit.ty(match vector(components) {
-                Some(size) => TypeInner::Vector {
-                    size,
-                    scalar: naga::Scalar::F32,
-                },
-                None => TypeInner::Scalar(naga::Scalar::F32),
-            })
-        };
+        let ty = |edit: &mut Edit<'_>| edit.ty(floats(components));
 
         let mut edit = Edit::new(flow.shader, Stage::Vertex);
         let mut value = movable
@@ -667,31 +658,6 @@ impl<'a> Study<'a> {
         entry
             .and_then(|entry| path.strip_prefix(entry.name.as_str())?.strip_prefix('.'))
             .unwrap_or(path)
-    }
-}
-
-/// The size of a vector of so many components; `None` of one.
-fn vector(components: usize) -> Option<VectorSize> {
-    match components {
-        2 => Some(VectorSize::Bi),
-        3 => Some(VectorSize::Tri),
-        4 => Some(VectorSize::Quad),
-        _ => None,
-    }
-}
-
-/// So many components of a vector, from one on.
-fn part(whole: Handle<Expression>, from: usize, count: usize) -> Expression {
-    match vector(count) {
-        None => Expression::AccessIndex {
-            base: whole,
-            index: from as u32,
-        },
-        Some(size) => Expression::Swizzle {
-            size,
-            vector: whole,
-            pattern: [0, 1, 2, 3].map(|at| SwizzleComponent::XYZW[(from + at).min(3)]),
-        },
     }
 }
 

@@ -7,6 +7,7 @@ use super::varyings::{Varyings, location, outputs, same_place};
 use super::{EmitLevel, flaw};
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
+use lodc_passes::edit::append;
 use lodc_passes::gradients::Front;
 use lodc_passes::shader::Stage;
 use lodc_passes::{Shader, operands};
@@ -286,12 +287,12 @@ impl HandedOver<'_> {
                 }
                 (None, _) => Expression::ZeroValue(*ty),
             };
-            components.push(add(function, expression));
+            components.push(append(function, expression));
         }
         let members = members.into_iter();
         let members = members.map(|(name, binding, ty, _)| (name, Some(binding), ty));
         let ty = insert_struct(module, self.name, members)?;
-        let returned = add(function, Expression::Compose { ty, components });
+        let returned = append(function, Expression::Compose { ty, components });
         let statement = Statement::Return {
             value: Some(returned),
         };
@@ -341,17 +342,6 @@ fn insert_struct(
         },
     };
     Some(module.types.insert(ty, Span::UNDEFINED))
-}
-
-/// Puts a value at the end of a function.
-fn add(function: &mut Function, expression: Expression) -> Handle<Expression> {
-    let is_emitted = !expression.needs_pre_emit();
-    let value = function.expressions.append(expression, Span::UNDEFINED);
-    if is_emitted {
-        let range = naga::Range::new_from_bounds(value, value);
-        function.body.push(Statement::Emit(range), Span::UNDEFINED);
-    }
-    value
 }
 
 /// Takes the use away that a value of the function's outermost block makes of others, where nothing uses the value: what

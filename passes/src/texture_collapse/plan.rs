@@ -3,7 +3,7 @@
 use super::seen::{Of, Sample, repeats, sample, seen_from};
 use super::{Kind, STAGE, find};
 use crate::Work;
-use crate::edit::{Edit, New};
+use crate::edit::{Edit, New, part};
 use crate::flow::{Flow, Value};
 use crate::generated::{Generated, Read, settled};
 use crate::interface::{Authors, Output};
@@ -15,7 +15,7 @@ use crate::slice::{Around, Slice, Source};
 use naga::{
     Binding, EntryPoint, Expression, Function, FunctionArgument, GlobalVariable, Handle,
     ImageClass, ImageDimension, Literal, LocalVariable, SampleLevel, Scalar, ScalarKind,
-    ShaderStage, Span, Statement, SwizzleComponent, TypeInner, VectorSize,
+    ShaderStage, Span, Statement, TypeInner, VectorSize,
 };
 use std::sync::Arc;
 
@@ -70,13 +70,9 @@ impl<'a> Plan<'a> {
         if flow.floats(site).is_none() {
             return no("it is no float, or vector of floats");
         }
-        let mut ends = vec![false; flow.function.expressions.len()];
-        ends[root.index()] = true;
-        let slice = Slice::up_to(flow, site, ends);
-        let known = |value: Value| value == root || of[value.index()] != Of::Unknown;
-        if !slice.values().all(known) {
+        let Some(slice) = known_slice(flow, (site, root), of) else {
             return no("what ends a loop in it is more than texels and constants");
-        }
+        };
         let around = slice.around();
         if around.contains(&Around::Loop) {
             return no("each round of a loop computes it anew");
@@ -161,13 +157,9 @@ impl<'a> Plan<'a> {
         if !(1..=MOST_EDGE).contains(&edge) {
             return no("no texture has such an edge");
         }
-        let mut ends = vec![false; flow.function.expressions.len()];
-        ends[root.index()] = true;
-        let slice = Slice::up_to(flow, site, ends);
-        let known = |value: Value| value == root || of[value.index()] != Of::Unknown;
-        if !slice.values().all(known) {
+        let Some(slice) = known_slice(flow, (site, root), of) else {
             return no("what ends a loop in it is more than texture coordinates and constants");
-        }
+        };
         if !slice.around().is_empty() || !is_outermost(flow, site) {
             return no("it is in a branch, where a texture is not sampled with an implicit level");
         }
@@ -286,23 +278,8 @@ impl<'a> Plan<'a> {
             }
         };
         let read = match components {
-            1 => Some(Expression::AccessIndex {
-                base: carrier,
-                index: 0,
-            }),
-            2 | 3 => Some(Expression::Swizzle {
-                size: match components {
-                    2 => VectorSize::Bi,
-                    _ => VectorSize::Tri,
-                },
-                vector: carrier,
-                pattern: SwizzleComponent::XYZW,
-            }),
-            _ => None,
-        };
-        let read = match read {
-            Some(read) => edit.add(format!("{path}.collapsed"), read),
-            None => carrier,
+            4 => carrier,
+            count => edit.add(format!("{path}.collapsed"), part(carrier, 0, count)),
         };
         edit.replace(self.site, New::Value(read));
         settled(edit.finish())
@@ -549,6 +526,20 @@ fn unneeded(flow: &Flow, slice: &Slice<'_>, site: Value) -> Vec<bool> {
             return unneeded;
         }
     }
+}
+
+/// What a value is computed of down to its root; `None` when something in it is not known.
+fn known_slice<'a>(
+    flow: &'a Flow<'a>,
+    (site, root): (Value, Value),
+    of: &[Of],
+) -> Option<Slice<'a>> {
+    let mut ends = vec![false; flow.function.expressions.len()];
+    ends[root.index()] = true;
+    let slice = Slice::up_to(flow, site, ends);
+    let known = |value: Value| value == root || of[value.index()] != Of::Unknown;
+    let all_known = slice.values().all(known);
+    all_known.then_some(slice)
 }
 
 /// Whether a value is computed, and used, outside of all branches and loops.

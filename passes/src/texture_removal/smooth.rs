@@ -1,7 +1,6 @@
 //! A smooth texture as a short sum of functions of its coordinates.
 
-use crate::basis::floats;
-use crate::edit::Edit;
+use crate::edit::{Edit, floats};
 use crate::facts::{Fit, TextureFacts, ValueFacts};
 use crate::flow::{Flow, Value};
 use crate::operands::User;
