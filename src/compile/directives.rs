@@ -466,16 +466,12 @@ fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f { // lodc: keep
 
     #[test]
     fn what_is_marked_stays_in_every_level() {
-        use crate::search::{Scope, Stand, find};
+        use crate::search::{Scope, find};
         use lodc_passes::ValueId;
         let levels = |text: &str| {
             let ready = ready(text);
             let vertex = ready.vertex().expect("lodc supplies one");
-            let stand = Stand {
-                base: &ready.base,
-                vertex: &vertex,
-                scene: &ready.scene,
-            };
+            let stand = ready.stand(&vertex);
             let kept = ready.kept(&Request::default()).expect("they are known");
             let found = find(&stand, (Scope::Levels, &kept), &|_| {}).expect("it runs");
             assert!(found.levels.len() > 1, "there is no level");

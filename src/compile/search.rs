@@ -143,6 +143,15 @@ impl Ready {
     pub(super) fn vertex(&self) -> Result<Program> {
         vertex_program(&self.scene, &self.base).map_err(|refused| refusal(&refused, &self.source))
     }
+
+    /// What a search measures with.
+    pub(super) fn stand<'a>(&'a self, vertex: &'a Program) -> Stand<'a> {
+        Stand {
+            base: &self.base,
+            vertex,
+            scene: &self.scene,
+        }
+    }
 }
 
 /// The vertex program of a shader in its scene: its own, or the one that lodc supplies.
@@ -206,11 +215,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
 
-    let stand = Stand {
-        base: &ready.base,
-        vertex: &vertex,
-        scene: &ready.scene,
-    };
+    let stand = ready.stand(&vertex);
     let kept = ready.kept(request)?;
     let found = search::find(&stand, (request.exact, &kept), progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
@@ -589,11 +594,7 @@ pub fn trajectory(request: &Request) -> Result<Vec<search::Step>> {
     let ready = Ready::read(request)?;
     let vertex = ready.vertex()?;
     ready.ends(&vertex)?;
-    let stand = Stand {
-        base: &ready.base,
-        vertex: &vertex,
-        scene: &ready.scene,
-    };
+    let stand = ready.stand(&vertex);
     let kept = ready.kept(request)?;
     search::trajectory(&stand, &kept, ready.scene.farthest)
         .map_err(|refused| refusal(&refused, &ready.source))
@@ -607,11 +608,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let ready = Ready::read(request)?;
     let vertex = ready.vertex()?;
     ready.ends(&vertex)?;
-    let stand = Stand {
-        base: &ready.base,
-        vertex: &vertex,
-        scene: &ready.scene,
-    };
+    let stand = ready.stand(&vertex);
     let distances = &ready.scene.distances;
     let distance = distances[distances.len() / 2];
     let set = SampleSet::new(&stand, distance, Samples::Search)

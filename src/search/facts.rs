@@ -380,6 +380,17 @@ mod tests {
         })
     }
 
+    /// A scene with pictures of 96 x 96 pixels.
+    fn small(scene: &str) -> String {
+        let lines = scene
+            .lines()
+            .map(|line| match line.starts_with("resolution") {
+                true => "resolution = [96, 96]",
+                false => line,
+            });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
     #[test]
     fn a_roughness_that_takes_up_the_slopes_leaves_less_error_than_a_mean_normal() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
@@ -388,14 +399,7 @@ mod tests {
             let scene = std::fs::read_to_string(path.with_extension("toml")).expect("it is there");
             // A rough surface, so that there are slopes in all directions.
             let scene = scene.replace("panel_normal", "rock_normal");
-            let lines = scene
-                .lines()
-                .map(|line| match line.starts_with("resolution") {
-                    true => "resolution = [96, 96]",
-                    false => line,
-                });
-            let scene: Vec<&str> = lines.collect();
-            let [mean, widened] = added(&path, &scene.join("\n"), 0.5, "normal-to-roughness");
+            let [mean, widened] = added(&path, &small(&scene), 0.5, "normal-to-roughness");
             assert!(widened[1] < mean[1].min(mean[0]), "{mean:?} {widened:?}");
         }
     }
@@ -405,14 +409,7 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
         let path = folder.join("car_paint.wgsl");
         let scene = std::fs::read_to_string(path.with_extension("toml")).expect("it is there");
-        let lines = scene
-            .lines()
-            .map(|line| match line.starts_with("resolution") {
-                true => "resolution = [96, 96]",
-                false => line,
-            });
-        let scene: Vec<&str> = lines.collect();
-        let [mean, sum] = added(&path, &scene.join("\n"), 0.5, "harmonics");
+        let [mean, sum] = added(&path, &small(&scene), 0.5, "harmonics");
         assert!(sum[1] < 0.75 * mean[1].min(mean[0]), "{mean:?} {sum:?}");
     }
 
