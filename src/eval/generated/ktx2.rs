@@ -1,6 +1,6 @@
 //! KTX2 files of uncompressed textures: two dimensions or a cube, all MIP levels (Khronos Texture File Format, version 2).
 
-use super::TexelFormat;
+use super::{MAX_EDGE, TexelFormat};
 use crate::eval::texture::{Dimension, Level, Texture};
 
 /// The extension of such files.
@@ -142,6 +142,9 @@ pub(super) fn read(bytes: &[u8]) -> Option<Texture> {
     let [width, height, depth, layers, faces, count, compression] =
         [20, 24, 28, 32, 36, 40, 44].map(word);
     let (width, height, count) = (width?, height?, count?);
+    if width.max(height) > MAX_EDGE {
+        return None;
+    }
     let dimension = match faces? {
         1 => Dimension::D2,
         6 if width == height => Dimension::Cube,
@@ -207,6 +210,9 @@ mod tests {
                 let mut other = bytes.clone();
                 other[36] = 5;
                 assert_eq!(read(&other), None);
+                let mut vast = bytes.clone();
+                vast[20..28].fill(0xff);
+                assert_eq!(read(&vast), None);
             }
         }
     }
