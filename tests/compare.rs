@@ -311,6 +311,67 @@ fn emitted_forms_have_the_errors_of_their_report() {
     }
 }
 
+/// A table that the first level replaces by a plane, which from farther away is over the bound.
+const GOES_BACK: &str = "
+    @group(0) @binding(1) var grime: texture_2d<f32>;
+    @group(0) @binding(2) var table: texture_2d<f32>;
+    @group(0) @binding(3) var s: sampler;
+    @group(0) @binding(4) var<uniform> camera: mat4x4f;
+    struct Surface { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
+    @vertex fn vs(@location(0) position: vec3f, @location(2) uv: vec2f) -> Surface {
+        return Surface(camera * vec4f(position, 1.0), uv);
+    }
+    @fragment fn fs(in: Surface) -> @location(0) vec4f {
+        let read = textureSample(table, s, in.uv);
+        let dirt = textureSample(grime, s, in.uv).bgra;
+        let both = sqrt(max(mix(read * read, dirt, 0.25), vec4f(0.0)));
+        let bright = max(sqrt(vec4f(0.2, 0.25, 1.0, 0.5)), read.bgra);
+        return vec4f(both.rgb + 0.5 * bright.rgb, 1.0);
+    }";
+
+#[test]
+fn a_level_that_is_the_original_again_is_written() {
+    let textures = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/textures");
+    let scene = format!(
+        "object = \"plane\"\nresolution = [48, 48]\nlevels = 3\nviews = {{ directions = [[0, 0.4, 1]] }}
+         [distance]\nnearest = 2.5\nfarthest = 20
+         [uniforms]\ncamera = \"model-view-projection\"
+         [textures]\ngrime = {:?}\ntable = {{ file = {:?}, space = \"linear\" }}\n",
+        textures.join("grime.png"),
+        textures.join("diffuse_lut.png")
+    );
+    let folder = folder("goes-back", &[("a.wgsl", GOES_BACK), ("a.toml", &scene)]);
+    let compared = CompareRequest {
+        other: folder.join("a.lod.wgsl"),
+        ..request(&folder)
+    };
+    let compiled = compile::compile(&compared.original, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    write_atomically(&compiled.files).expect("they can be written");
+    let recipes = compiled
+        .report
+        .levels
+        .iter()
+        .map(|level| level.recipe.len());
+    let recipes: Vec<usize> = recipes.collect();
+    assert!(
+        matches!(recipes[..], [0, changed, 0] if changed > 0),
+        "{recipes:?}"
+    );
+    let (files, _) = compile::locked(&compared.original).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(files[0].1, fs::read(&compared.other).expect("it is there"));
+    let compared = compare(&compared, &|| {}).unwrap_or_else(|e| panic!("{e}"));
+    let pairs = compared
+        .comparison
+        .distances
+        .iter()
+        .zip(&compiled.report.levels);
+    for (at, level) in pairs {
+        assert_eq!(at.distance, level.distance);
+        close(at.error.rmse, level.error.rmse);
+        assert!(at.error.excess <= level.error.bound);
+    }
+}
+
 #[test]
 fn a_scene_may_name_what_only_one_of_them_has() {
     let buffer = |name: &str, of: &str| {

@@ -220,12 +220,9 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let found = search::find(&stand, (request.exact, &kept), progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
-    let levels: Vec<EmitLevel> = found
-        .levels
-        .iter()
-        .zip(&says)
-        .filter(|(level, _)| !level.is_original)
-        .map(emit_level)
+    let written = found.written();
+    let levels: Vec<EmitLevel> = written
+        .map(|(at, level)| emit_level(level, &says[at]))
         .collect();
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
@@ -317,14 +314,14 @@ fn too_many(base: &Shader, made: usize, emission: Output) -> Option<Box<Diagnost
 }
 
 /// A level's figures as the lock and the shader's header hold them.
-fn emit_level((level, says): (&Level, &String)) -> EmitLevel {
+fn emit_level(level: &Level, says: &str) -> EmitLevel {
     EmitLevel {
         autolod: level.autolod as f32,
         shader: level.shader.clone(),
         distance: figure(level.distance),
         error: figure(level.error.rmse),
         cost: figure(level.cost),
-        says: says.clone(),
+        says: says.to_owned(),
     }
 }
 
@@ -524,13 +521,12 @@ impl Ready {
                 false => found.exact.recipe.clone(),
             },
             levels: found
-                .levels
-                .iter()
-                .zip(transitions)
-                .filter(|(level, _)| !level.is_original)
+                .written()
                 .zip(levels)
-                .map(|((level, transition), emitted)| emit::LockedLevel {
-                    band_cost: transition.as_ref().and_then(|transition| transition.cost),
+                .map(|((at, level), emitted)| emit::LockedLevel {
+                    band_cost: transitions[at]
+                        .as_ref()
+                        .and_then(|transition| transition.cost),
                     autolod: emitted.autolod,
                     distance: emitted.distance,
                     error: emitted.error,

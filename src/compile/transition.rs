@@ -37,9 +37,7 @@ impl Ready {
         let is_known = levels
             .iter()
             .all(|level| level.shader.parameters().is_empty());
-        let emitted_levels = found.levels.iter().enumerate();
-        let emitted_levels = emitted_levels.filter(|(_, level)| !level.is_original);
-        for (place, (at, _)) in emitted_levels.enumerate() {
+        for (place, (at, _)) in found.written().enumerate() {
             let Some(until) = emit::band_end(levels, place, output) else {
                 continue;
             };

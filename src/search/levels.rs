@@ -89,6 +89,23 @@ impl Level {
             ..Self::original(stand, nearest)
         }
     }
+
+    /// What draws the same as the original, from a distance on at which no level before will do any more.
+    fn back(stand: &Stand<'_>, set: &SampleSet<'_>, exact: &Exact) -> Result<Self, Refused> {
+        let original = Self::original(stand, set);
+        if exact.recipe.0.is_empty() {
+            return Ok(original);
+        }
+        let measured = set.measure(&exact.shader)?;
+        Ok(Self {
+            is_original: false,
+            shader: exact.shader.clone(),
+            cost: set.share(measured.cost),
+            time: measured.used.work.total() / original.used.work.total(),
+            used: measured.used,
+            ..original
+        })
+    }
 }
 
 /// What was seen at one distance.
@@ -124,6 +141,15 @@ pub struct Found {
     pub rho0: f64,
 }
 
+impl Found {
+    /// The levels that are written, with their places: all but the original as it stands where it is the first one, since
+    /// that is there already.
+    pub fn written(&self) -> impl Iterator<Item = (usize, &Level)> {
+        let levels = self.levels.iter().enumerate();
+        levels.filter(|(at, level)| *at > 0 || !level.is_original)
+    }
+}
+
 /// How far a search has come.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
@@ -146,7 +172,7 @@ pub fn find(
     stand: &Stand<'_>,
     (scope, kept): (Scope, &Kept),
     progress: &(dyn Fn(Progress) + Sync),
-) -> std::result::Result<Found, Refused> {
+) -> Result<Found, Refused> {
     let scene = stand.scene;
     let distances = &scene.distances;
     let nearest = SampleSet::new(stand, distances[0], Samples::Full)?;
@@ -225,7 +251,8 @@ pub fn find(
             Some(level) if worth(&level) => Some(level),
             _ if before.is_original => None,
             _ if cost_here <= 1.0 && checks.hold(&before.shader) => None,
-            other => Some(other.unwrap_or_else(|| Level::original(stand, checks.start()))),
+            Some(level) => Some(level),
+            None => Some(Level::back(stand, checks.start(), &exact)?),
         };
         if let Some(mut level) = next_level {
             level.held_out = Some(test(stand, &level)?);
@@ -259,7 +286,7 @@ pub(crate) fn threshold(scene: &Scene, distance: f64) -> f64 {
 }
 
 /// The error of a level on the test split, which decides nothing.
-fn test(stand: &Stand<'_>, level: &Level) -> std::result::Result<HeldOut, Refused> {
+fn test(stand: &Stand<'_>, level: &Level) -> Result<HeldOut, Refused> {
     let set = SampleSet::new(stand, level.distance, Samples::HeldOut(Split::Test))?;
     let (details, original) = set.pair(&level.shader)?;
     Ok(HeldOut::new(&details, original))
