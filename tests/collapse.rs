@@ -172,63 +172,99 @@ fn at(shader: &Shader, bindings: &Bindings, points: &[[f32; 2]]) -> Vec<[f32; 4]
     found
 }
 
-#[test]
-fn collapsed_expressions_are_the_original_texel_for_texel() {
-    const EDGE: u32 = 16;
+/// A shader that returns an expression over three textures, with something added to it.
+fn shader_of(expression: &str, added: &str) -> Shader {
+    let text = format!(
+        "@group(0) @binding(0) var t0: texture_2d<f32>;
+         @group(0) @binding(1) var t1: texture_2d<f32>;
+         @group(0) @binding(2) var t2: texture_2d<f32>;
+         @group(0) @binding(3) var s: sampler;
+         @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {{
+             return {expression}{added};
+         }}"
+    );
+    let source = Source::parse("random.wgsl", text.as_str()).unwrap_or_else(|e| panic!("{e}"));
+    normal_form(&source).expect("it is small")
+}
+
+/// Three random textures that are so large, and a sampler.
+fn random_textures(edges: [u32; 3], sampler: Sampler) -> Bindings {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let mut texture = || {
-        let texels = (0..EDGE * EDGE).map(|_| [0; 4].map(|_| random.below(256) as f32 / 255.0));
+    let mut bindings = Bindings::new();
+    for (binding, edge) in (0..3).zip(edges) {
+        let texels = (0..edge * edge).map(|_| [0; 4].map(|_| random.below(256) as f32 / 255.0));
         let image = Image {
-            width: EDGE,
-            height: EDGE,
+            width: edge,
+            height: edge,
             texels: texels.collect(),
         };
         let texture = Texture::new(Dimension::D2, vec![image]).expect("it has texels");
-        Resource::Texture(Arc::new(texture.with_mip_chain()))
-    };
-    let mut bindings = Bindings::new();
-    for binding in 0..3 {
-        bindings.insert((0, binding), texture());
+        let texture = Resource::Texture(Arc::new(texture.with_mip_chain()));
+        bindings.insert((0, binding), texture);
     }
+    bindings.insert((0, 3), Resource::Sampler(Arc::new(sampler)));
+    bindings
+}
+
+/// The facts of three textures whose images are known, that are so large.
+fn known_textures(edges: [u32; 3]) -> lodc_passes::Facts {
+    let textures = ["t0", "t1", "t2"]
+        .into_iter()
+        .zip(edges)
+        .map(|(name, edge)| {
+            let known = facts::TextureFacts {
+                size: [edge; 2],
+                mean: vec![[0.5; 4]],
+                ..facts::TextureFacts::default()
+            };
+            (name.to_owned(), known)
+        });
+    lodc_passes::Facts {
+        textures: textures.collect(),
+        repeating: ["s".to_owned()].into(),
+        ..lodc_passes::Facts::default()
+    }
+}
+
+/// How far a format may leave a component from what it was: half a step of eight bits, of the code where that is not the
+/// number itself, or half a unit in the last place of a float of 16 bits; but for how precise the comparison itself is.
+fn half_a_step(format: TexelFormat, component: usize, exact: f32, stored: f32) -> bool {
+    let (exact, stored) = (f64::from(exact), f64::from(stored));
+    let encoded = |x: f64| match x <= 0.003_130_8 {
+        true => 12.92 * x,
+        false => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+    };
+    let (off, step) = match (format, component) {
+        (TexelFormat::Rgba16Float, _) => {
+            let exponent = exact.abs().max(2.0_f64.powi(-14)).log2().floor();
+            (exact - stored, 2.0_f64.powf(exponent - 10.0))
+        }
+        (TexelFormat::Rgba8UnormSrgb, 0..3) => (encoded(exact) - encoded(stored), 1.0 / 255.0),
+        _ => (exact - stored, 1.0 / 255.0),
+    };
+    off.abs() <= 0.5 * step + 1e-6
+}
+
+#[test]
+fn collapsed_expressions_are_the_original_texel_for_texel() {
     let nearest = Sampler {
         linear_magnification: false,
         linear_minification: false,
         ..Sampler::default()
     };
-    bindings.insert((0, 3), Resource::Sampler(Arc::new(nearest)));
-    let centres =
-        (0..EDGE * EDGE).map(|i| [i % EDGE, i / EDGE].map(|x| (x as f32 + 0.5) / EDGE as f32));
-    let centres: Vec<[f32; 2]> = centres.collect();
-
     let mut formats = std::collections::BTreeSet::new();
     let mut collapsed = 0;
-    for seed in 0..120 {
+    for (seed, edges) in (0..160).zip([[16; 3], [16, 8, 4], [12, 7, 10]].into_iter().cycle()) {
+        let bindings = random_textures(edges, nearest);
         let mut random = Random(seed * 77 + 1);
+        // A sum, since of a swizzle what is swizzled is collapsed.
         let text = format!(
-            "@group(0) @binding(0) var t0: texture_2d<f32>;
-             @group(0) @binding(1) var t1: texture_2d<f32>;
-             @group(0) @binding(2) var t2: texture_2d<f32>;
-             @group(0) @binding(3) var s: sampler;
-             @fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {{
-                 return {} + vec4f(uv, 0.0, 0.0);
-             }}",
+            "(0.875 * {} + 0.125 * textureSample(t0, s, uv))",
             expression(&mut random, 4)
         );
-        let source = Source::parse("random.wgsl", text.as_str()).unwrap_or_else(|e| panic!("{e}"));
-        let base = normal_form(&source).expect("it is small");
-        let known = facts::TextureFacts {
-            mean: vec![[0.5; 4]],
-            ..facts::TextureFacts::default()
-        };
-        let names = ["t0", "t1", "t2"];
-        let facts = lodc_passes::Facts {
-            textures: names
-                .iter()
-                .map(|name| ((*name).to_owned(), known.clone()))
-                .collect(),
-            ..lodc_passes::Facts::default()
-        };
-        for candidate in TextureCollapse.candidates(&base, &facts) {
+        let alone = shader_of(&text, "");
+        let base = shader_of(&text, " + vec4f(uv, 0.0, 0.0)");
+        for candidate in TextureCollapse.candidates(&base, &known_textures(edges)) {
             let variant = recipe::apply(&base, &candidate).expect("it was offered");
             variant
                 .validate()
@@ -246,18 +282,27 @@ fn collapsed_expressions_are_the_original_texel_for_texel() {
             textures.bind(&mut bound, &Store::default());
             let baked = textures.baked(&bindings, &Store::default()).remove(0);
             formats.insert(baked.format);
-            let limit = match baked.format {
-                TexelFormat::Rgba16Float => 1.0 / 2048.0,
-                _ => 0.5 / 255.0 * 2.3,
-            };
-            // What the format leaves may be scaled by what is done to it afterwards, which is nothing but a sum here.
-            let pairs = at(&base, &bound, &centres)
-                .into_iter()
-                .zip(at(&variant, &bound, &centres));
-            for (original, now) in pairs {
-                for (a, b) in original.iter().zip(&now) {
-                    let off = (a - b).abs() / a.abs().max(1.0);
-                    assert!(off <= limit, "{candidate}: {original:?} {now:?}\n{text}");
+            let [width, height, _] = baked.texture.size(0);
+            let centres = (0..width * height).map(|i| {
+                let [x, y] = [i % width, i / width].map(|x| x as f32 + 0.5);
+                [x / width as f32, y / height as f32]
+            });
+            let centres: Vec<[f32; 2]> = centres.collect();
+            // The texture is the original at the centre of each texel, rounded to the nearest that the format has; and the
+            // variant does nothing but read it.
+            let exact = at(&alone, &bindings, &centres);
+            let now = at(&variant, &bound, &centres);
+            for (i, exact) in exact.into_iter().enumerate() {
+                let stored = baked.texture.levels()[0].texels[i];
+                assert_eq!(stored, baked.format.rounded(exact), "{candidate}\n{text}");
+                for c in 0..4 {
+                    assert!(
+                        half_a_step(baked.format, c, exact[c], stored[c]),
+                        "{candidate}: {exact:?} {stored:?} {:?}\n{text}",
+                        baked.format
+                    );
+                    let added = [centres[i][0], centres[i][1], 0.0, 0.0];
+                    assert_eq!(now[i][c], stored[c] + added[c], "{candidate}\n{text}");
                 }
             }
             if TextureCollapse.class(&candidate) == Class::Lossless {
@@ -269,8 +314,135 @@ fn collapsed_expressions_are_the_original_texel_for_texel() {
             collapsed += 1;
         }
     }
-    assert!(collapsed > 60, "{collapsed}");
+    assert!(collapsed > 80, "{collapsed}");
     assert_eq!(formats.len(), 3, "{formats:?}");
+}
+
+#[test]
+fn linear_expressions_are_the_original_between_texels_too() {
+    let mut random = Random(7);
+    let bindings = random_textures([16; 3], Sampler::default());
+    let points: Vec<[f32; 2]> = (0..512)
+        .map(|_| [0; 2].map(|_| random.below(4096) as f32 / 1024.0 - 2.0))
+        .collect();
+    let mut collapsed = 0;
+    for seed in 0..300 {
+        let text = expression(&mut Random(seed * 91 + 5), 2);
+        // Every other one between two MIP levels.
+        let text = match seed % 2 {
+            0 => text,
+            _ => text
+                .replace("textureSample", "textureSampleLevel")
+                .replace("s, uv)", "s, uv, 1.25)"),
+        };
+        let base = shader_of(&text, "");
+        for candidate in TextureCollapse.candidates(&base, &known_textures([16; 3])) {
+            if TextureCollapse.class(&candidate) != Class::Lossless {
+                continue;
+            }
+            let variant = recipe::apply(&base, &candidate).expect("it was offered");
+            let textures = GeneratedTextures::of(&variant).expect("it runs");
+            let baked = textures.baked(&bindings, &Store::default()).remove(0);
+            let mut bound = bindings.clone();
+            textures.bind(&mut bound, &Store::default());
+            // What a filter mixes is off by what its texels are off by at most. Where a code is of light, bright texels are off
+            // by the most.
+            let most = |x: f32, c: usize| match (baked.format, c) {
+                (TexelFormat::Rgba16Float, _) => x / 2048.0,
+                (TexelFormat::Rgba8UnormSrgb, 0..3) => 0.5 / 255.0 * 2.4 / 1.055,
+                _ => 0.5 / 255.0,
+            };
+            let texels = baked.texture.levels()[0].texels.iter().flatten();
+            let largest = texels.fold(0.0_f32, |most, x| most.max(x.abs()));
+            let pairs = at(&base, &bindings, &points)
+                .into_iter()
+                .zip(at(&variant, &bound, &points));
+            for (original, now) in pairs {
+                for c in 0..4 {
+                    let off = (original[c] - now[c]).abs();
+                    assert!(
+                        off <= most(largest, c) + 4e-6 * largest,
+                        "{candidate}: {original:?} {now:?} {:?}\n{text}",
+                        baked.format
+                    );
+                }
+            }
+            collapsed += 1;
+        }
+    }
+    assert!(collapsed > 20, "{collapsed}");
+}
+
+#[test]
+fn what_is_written_of_random_expressions_has_the_errors_that_are_reported() {
+    let textures = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/textures");
+    let image = |name: &str| textures.join(name).with_extension("png");
+    let scene = format!(
+        "object = \"plane\"\nresolution = [48, 48]\nlevels = 3\nviews = {{ directions = [[0, 0.4, 1]] }}
+         [distance]\nnearest = 2.5\nfarthest = 20
+         [uniforms]\ncamera = \"model-view-projection\"
+         [textures]\nt0 = {:?}\nt1 = {:?}\nt2 = {{ file = {:?}, space = \"linear\" }}\n",
+        image("hide_albedo"),
+        image("grime"),
+        image("diffuse_lut")
+    );
+    let mut made = 0;
+    for seed in 0..12 {
+        let folder = folder(&format!("random-{seed}"));
+        let text = format!(
+            "@group(0) @binding(0) var t0: texture_2d<f32>;
+             @group(0) @binding(1) var t1: texture_2d<f32>;
+             @group(0) @binding(2) var t2: texture_2d<f32>;
+             @group(0) @binding(3) var s: sampler;
+             @group(0) @binding(4) var<uniform> camera: mat4x4f;
+             struct Surface {{ @builtin(position) clip: vec4f, @location(0) uv: vec2f }}
+             @vertex fn vs(@location(0) position: vec3f, @location(2) uv: vec2f) -> Surface {{
+                 return Surface(camera * vec4f(position, 1.0), uv);
+             }}
+             @fragment fn fs(in: Surface) -> @location(0) vec4f {{
+                 let uv = in.uv;
+                 return vec4f(({}).rgb + 0.5 * ({}).rgb, 1.0);
+             }}",
+            expression(&mut Random(seed * 131 + 3), 3),
+            expression(&mut Random(seed * 57 + 11), 2)
+        );
+        fs::write(folder.join("random.wgsl"), &text).expect("it can be written");
+        fs::write(folder.join("random.toml"), &scene).expect("it can be written");
+        let request = Request {
+            shader: folder.join("random.wgsl"),
+            textures: true,
+            ..Request::default()
+        };
+        let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+        write_atomically(&compiled.files).expect("they can be written");
+        if compiled.report.levels.len() < 2 {
+            continue;
+        }
+        made += compiled
+            .files
+            .iter()
+            .filter(|(file, _)| file.starts_with(folder.join("random.lod")))
+            .count();
+        let compared = compile::compare(
+            &CompareRequest {
+                original: request,
+                other: folder.join("random.lod.wgsl"),
+                ..CompareRequest::default()
+            },
+            &|| {},
+        );
+        let compared = compared.unwrap_or_else(|e| panic!("{e}\n{text}"));
+        for level in &compiled.report.levels {
+            let mut at = compared.comparison.distances.iter();
+            let at = at.find(|at| at.distance == level.distance);
+            let at = at.expect("every level starts at a distance of the scene");
+            let off = (at.error.rmse - level.error.rmse).abs();
+            assert!(off < 1e-6, "{} {}\n{text}", at.error.rmse, level.error.rmse);
+            let (excess, bound) = (level.error.excess, level.error.bound);
+            assert!(excess <= bound, "{excess} {bound}\n{text}");
+        }
+    }
+    assert!(made >= 4, "{made}");
 }
 
 /// A folder of the test's own.

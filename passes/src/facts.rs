@@ -226,6 +226,8 @@ pub struct Fit {
 /// What is known of the image behind a texture. Colours are linear, as a sample returns them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextureFacts {
+    /// Width and height of its finest level in texels.
+    pub size: [u32; 2],
     /// The mean over the whole texture at each MIP level, finest first; where its alpha is what is seen of the
     /// others, those are weighed by it.
     pub mean: Vec<[f32; 4]>,

@@ -61,6 +61,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
             facts.textures.insert(
                 name.clone(),
                 TextureFacts {
+                    size: [16; 2],
                     mean: vec![[0.5, 0.25, 0.75, 1.0]; 3],
                     deviation: vec![
                         [0.25, 0.25, 0.25, 0.0],

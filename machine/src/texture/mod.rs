@@ -259,13 +259,15 @@ impl Texture {
         self.levels.len() as u32
     }
 
-    /// Mean and standard deviation of every MIP level, summed in f64 in the order of the texels.
+    /// Size, and mean and standard deviation of every MIP level, summed in f64 in the order of the texels.
     /// `level` is the MIP level that a sample at the facts' distance falls on. Where alpha says how much is seen of a
     /// texel, `weighed`, the other components are weighed by it; alpha itself is not.
     pub fn facts(&self, level: f32, weighed: bool) -> TextureFacts {
         let levels = self.levels.iter();
         let (mean, deviation) = levels.map(|level| level.statistics(weighed)).unzip();
+        let [width, height, _] = self.size(0);
         TextureFacts {
+            size: [width, height],
             mean,
             deviation,
             level,

@@ -9,10 +9,10 @@
 //! returns. The texture is bound at the first free binding of the group of the textures that went into it. How its texels
 //! are computed is kept beside the variant (see [`crate::generated`]); uniforms that the scene fixes are numbers by then
 //! (see [`crate::specialize`]).
-//! - `same <root>`: all samples are at the root, and the value is a linear function of them, so that filtering before and
-//!   after gives the same.
-//! - `levels <root>`: all are at the root, but the value is no linear function. Each MIP level is computed from that level
-//!   of the sources: texel for texel it is the same, and what is filtered between texels differs.
+//! - `same <root>`: all samples are at the root, of textures that are as large as each other, and the value is a linear
+//!   function of them, so that filtering before and after gives the same.
+//! - `levels <root>`: all are at the root, but the value is no linear function, or textures differ in size. Each MIP level is
+//!   computed from that level of the sources: texel for texel it is the same, and what is filtered between texels differs.
 //! - `resampled <root>`: some are at an affine function of the root, by which they repeat along both axes. They are resampled
 //!   into the resolution of the finest of them.
 //!
@@ -185,7 +185,14 @@ fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
         for site in largest(flow, &of, |of| matches!(of, Of::Texels { .. })) {
             let plan = Plan::new(flow, (site, root), &of);
             let considered = match &plan {
-                Ok(plan) => Some((plan.kind, known(flow, plan, facts))),
+                Ok(plan) => {
+                    let kind = match plan.kind {
+                        // Between the texels of the finer one, the coarser ones have bends.
+                        Kind::Same if !are_as_large(flow, plan, facts) => Kind::Levels,
+                        kind => kind,
+                    };
+                    Some((kind, known(flow, plan, facts)))
+                }
                 // A sample that nothing is done to is not worth a word.
                 Err(_) if sample(flow, site).is_some() => None,
                 Err(why) => Some((Kind::Same, Err(why.clone()))),
@@ -276,19 +283,11 @@ fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
             Some(_) => {}
         }
     }
-    let counts = plan
-        .textures(flow)
-        .filter_map(|name| facts.textures.get(name));
-    let mut counts = counts.map(|texture| texture.mean.len());
     let given = plan
         .samples
         .iter()
         .any(|(_, read)| matches!(read.level, SampleLevel::Zero | SampleLevel::Exact(_)));
-    if given
-        && counts
-            .next()
-            .is_some_and(|first| counts.any(|other| other != first))
-    {
+    if given && !are_as_large(flow, plan, facts) {
         let why = "a level of detail that is given means another size in each of its textures";
         return Err(Declined(why.into()));
     }
@@ -303,6 +302,16 @@ fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
         }
     }
     has_room(flow, plan)
+}
+
+/// Whether all textures of a plan are as large as each other, level by level.
+fn are_as_large(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> bool {
+    let known = plan.textures(flow);
+    let mut sizes = known
+        .filter_map(|name| facts.textures.get(name))
+        .map(|texture| (texture.size, texture.mean.len()));
+    let first = sizes.next();
+    sizes.all(|size| Some(size) == first)
 }
 
 /// Declines what would make a stage sample too many textures.

@@ -52,9 +52,11 @@ impl<'a> Plan<'a> {
             Kind::Bake(edge) => Self::procedural(flow, (site, root), &of, edge)?,
             _ => Self::new(flow, (site, root), &of)?,
         };
-        match plan.kind == kind {
-            true => Ok(plan),
-            false => Err(Declined(format!("it could be `{}`", plan.kind.word()))),
+        match (kind, plan.kind) {
+            // Textures that differ in size: it does the same, and promises less.
+            (Kind::Levels, Kind::Same) => Ok(Self { kind, ..plan }),
+            _ if plan.kind == kind => Ok(plan),
+            _ => Err(Declined(format!("it could be `{}`", plan.kind.word()))),
         }
     }
 

@@ -2,6 +2,9 @@
 
 use crate::eval::image::{srgb_byte, srgb_encode, to_byte};
 
+/// A step of eight bits.
+pub(super) const STEP: f32 = 1.0 / 255.0;
+
 /// How the texels of a generated texture are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TexelFormat {
@@ -29,6 +32,19 @@ impl TexelFormat {
             Self::Rgba8Unorm | Self::Rgba8UnormSrgb => 4,
             Self::Rgba16Float => 8,
         }
+    }
+
+    /// Whether no component is further than half a step outside of what it can hold.
+    pub(super) fn holds(self, components: &[f32]) -> bool {
+        let mut all = components.iter().enumerate();
+        all.all(|(i, x)| {
+            let [below, above] = match (self, i) {
+                (Self::Rgba16Float, _) => return x.abs() < MOST_HALF,
+                (Self::Rgba8UnormSrgb, 0..3) => [SLOPE_AT_BLACK, SLOPE_AT_WHITE],
+                _ => [1.0; 2],
+            };
+            (-0.5 * STEP * below..=1.0 + 0.5 * STEP * above).contains(x)
+        })
     }
 
     /// A texel as it is stored.
@@ -69,6 +85,13 @@ impl TexelFormat {
     }
 }
 
+/// What rounds to no float of 16 bits.
+const MOST_HALF: f32 = 65520.0;
+
+/// How fast colours decode where their code is 0, and where it is 1.
+const SLOPE_AT_BLACK: f32 = 1.0 / 12.92;
+const SLOPE_AT_WHITE: f32 = 2.4 / 1.055;
+
 /// A float as one of 16 bits, rounded to nearest, ties to even; what is too large is the largest, NaN is 0.
 fn half(x: f32) -> u16 {
     let sign = ((x.to_bits() >> 16) & 0x8000) as u16;
@@ -76,7 +99,7 @@ fn half(x: f32) -> u16 {
     if x.is_nan() {
         return 0;
     }
-    if x >= 65520.0 {
+    if x >= MOST_HALF {
         return sign | 0x7bff;
     }
     let bits = x.to_bits();
@@ -116,9 +139,6 @@ mod tests {
     use super::*;
     use crate::eval::image::srgb_decode;
 
-    /// A step of eight bits.
-    const STEP: f32 = 1.0 / 255.0;
-
     #[test]
     fn halves_round_to_nearest_and_come_back() {
         for bits in 0..0x7c00_u16 {
@@ -145,6 +165,16 @@ mod tests {
                 assert_eq!(format.encode(format.decode(&bytes)), bytes, "{format:?}");
             }
         }
+        // Half a step of a dark colour is less.
+        for (x, held) in [
+            (-0.4 * STEP, [true, false]),
+            (-0.6 * STEP, [false; 2]),
+            (1.0 + STEP, [false, true]),
+        ] {
+            let formats = [TexelFormat::Rgba8Unorm, TexelFormat::Rgba8UnormSrgb];
+            assert_eq!(formats.map(|format| format.holds(&[x])), held, "{x}");
+        }
+        assert!(!TexelFormat::Rgba8UnormSrgb.holds(&[0.5, 0.5, 0.5, 1.0 + STEP]));
         let dark = srgb_decode(0.5 * STEP + 3.0 * STEP);
         let apart = |format: TexelFormat| (format.rounded([dark; 4])[0] - dark).abs();
         assert!(apart(TexelFormat::Rgba8UnormSrgb) < apart(TexelFormat::Rgba8Unorm));

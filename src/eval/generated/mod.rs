@@ -11,6 +11,7 @@
 mod format;
 mod ktx2;
 
+use format::STEP;
 pub use format::TexelFormat;
 
 use super::image::{Space, decode_png, encoded_png, srgb_encode};
@@ -30,9 +31,6 @@ pub const MAX_EDGE: u32 = 4096;
 
 /// Up to so many texels along an edge, each is the mean of 4 x 4 points; of 2 x 2 beyond.
 const FINER_UP_TO: u32 = 256;
-
-/// A step of eight bits.
-const STEP: f32 = 1.0 / 255.0;
 
 /// A texture that was made.
 #[derive(Clone, Debug)]
@@ -360,13 +358,10 @@ impl Bake {
     fn rounded(&self, levels: Vec<Level>) -> Baked {
         let used = self.components;
         let texels = || levels.iter().flat_map(|level| &level.texels);
-        let inside = |texel: &[f32; 4]| {
-            let mut numbers = texel[..used].iter();
-            numbers.all(|number| (-0.5 * STEP..=1.0 + 0.5 * STEP).contains(number))
-        };
-        let mut formats = vec![TexelFormat::Rgba16Float];
-        if texels().all(inside) {
-            formats = vec![TexelFormat::Rgba8Unorm, TexelFormat::Rgba8UnormSrgb];
+        let mut formats = vec![TexelFormat::Rgba8Unorm, TexelFormat::Rgba8UnormSrgb];
+        formats.retain(|format| texels().all(|texel| format.holds(&texel[..used])));
+        if formats.is_empty() {
+            formats = vec![TexelFormat::Rgba16Float];
         }
         // As a display shows it: dark colours have more steps there.
         let off = |format: TexelFormat, texel: &[f32; 4]| {
