@@ -26,3 +26,5 @@ pub mod report;
 pub mod scene;
 #[cfg(feature = "search")]
 pub mod search;
+#[cfg(feature = "search")]
+pub mod time;

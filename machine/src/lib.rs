@@ -11,5 +11,6 @@
 pub mod chance;
 pub mod lane;
 pub mod machine;
+pub mod mix;
 pub mod program;
 pub mod texture;

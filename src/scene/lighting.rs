@@ -79,6 +79,16 @@ impl SceneLighting {
         self.lighting.reads()
     }
 
+    /// How many bytes the material writes to the targets that it reads, for a pixel.
+    pub fn target_bytes(&self) -> u32 {
+        let colours = self.reads().iter().filter_map(|(_, plane)| match plane {
+            Plane::Target(location, format) => Some((*location, format.bytes())),
+            Plane::Depth => None,
+        });
+        let colours: BTreeMap<u32, u32> = colours.collect();
+        colours.values().sum()
+    }
+
     /// The frame that lights a picture of the material: its pixels are the picture's fine pixels.
     pub(super) fn frame(&self, material: &Frame, pose: &Pose, sphere: &Sphere) -> Frame {
         let pose = pose.moved(material.offset, material.grid);

@@ -9,6 +9,7 @@ use super::programs::Programs;
 use crate::eval::draw::{Layers, Lit, Seen, Shading, each_visible, resolve, seen, shade_into};
 use crate::eval::image::Picture;
 use crate::eval::machine::{Bindings, Profile};
+use crate::eval::mix::Mix;
 use crate::eval::program::Program;
 use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::scene::{Output, Scene, chance::mix};
@@ -78,6 +79,12 @@ pub(super) struct Executed {
     pub(super) fragments: u64,
     /// In them.
     pub(super) work: Work,
+    /// The same by class.
+    pub(super) mix: Mix,
+    /// Vertices that were shaded.
+    pub(super) vertices: u64,
+    /// In them.
+    pub(super) vertex_mix: Mix,
     /// Covered fragments of the whole pictures.
     pub(super) drawn: usize,
     /// What the vertex stage did more than the original's at all vertices, and the parameter stage for all draws, in
@@ -204,6 +211,9 @@ impl Rasterised {
             tally.add(&drawing.colours(&shading, self.reference.len(), output));
             executed.fragments += shading.profile.lanes;
             executed.work += shading.profile.work;
+            executed.mix += shading.profile.mix;
+            executed.vertices += coverage.vertex_profile.lanes;
+            executed.vertex_mix += coverage.vertex_profile.mix;
             executed.drawn += coverage.drawn;
             let each = |coverage: &Coverage| {
                 let Profile { work, lanes, .. } = &coverage.vertex_profile;

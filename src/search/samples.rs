@@ -6,13 +6,17 @@ use super::frame::{Executed, Part, Pen, Rasterised, shown};
 use super::programs::{self, Programs};
 use crate::eval::generated::Baked;
 use crate::eval::program::{Program, Refused};
+use crate::eval::raster::{Frame, Shape, shape};
 use crate::scene::{
-    Scene, Split,
+    Scene, SceneLighting, Split,
     chance::{child, unit},
 };
+use crate::time::model::{Extent, Features, Invocation};
 use lodc_passes::{Shader, Used};
+use naga::{Binding, Interpolation, ScalarKind};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
 
 /// Squares of 2 x 2 pixels that a search set has, over all of its frames; a frame has at least one block full.
 const SEARCH_SQUARES: usize = 1024;
@@ -68,6 +72,8 @@ pub struct Measured {
     pub used: Used,
     /// What that costs by the scene's goal; with the original's a share, and of the time alone [`lodc_passes::Work::total`].
     pub cost: f64,
+    /// What one invocation of each stage executes, by class.
+    pub invocation: Invocation,
 }
 
 /// A picture as a display shows it over black, one sample a pixel, at its centre.
@@ -91,7 +97,16 @@ pub struct SampleSet<'a> {
     /// Whether it has all that the strain asks for: whole tiles, at every offset.
     whole: bool,
     pub(super) frames: Vec<Rasterised>,
-    original: (Details, Used),
+    original: Drawn,
+    extent: OnceLock<Extent>,
+}
+
+/// What was drawn of a shader.
+#[derive(Clone, Default)]
+struct Drawn {
+    details: Details,
+    used: Used,
+    invocation: Invocation,
 }
 
 impl<'a> SampleSet<'a> {
@@ -173,7 +188,8 @@ impl<'a> SampleSet<'a> {
             distance,
             whole: samples != Samples::Search,
             frames: Vec::with_capacity(count),
-            original: Default::default(),
+            original: Drawn::default(),
+            extent: OnceLock::new(),
         });
         for of_all in rasterised {
             for (set, mut frame) in sets.iter_mut().zip(of_all) {
@@ -185,7 +201,7 @@ impl<'a> SampleSet<'a> {
             }
         }
         let original = Programs::with(stands[0].base, programs.swap_remove(0))?;
-        let original = sets[0].details(&original);
+        let original = sets[0].draw(&original);
         for set in &mut sets {
             set.original = original.clone();
         }
@@ -228,9 +244,10 @@ impl<'a> SampleSet<'a> {
             distance,
             whole: true,
             frames: frames.into_iter().flatten().collect(),
-            original: Default::default(),
+            original: Drawn::default(),
+            extent: OnceLock::new(),
         };
-        set.original = set.details(&original);
+        set.original = set.draw(&original);
         Ok(set)
     }
 
@@ -246,7 +263,7 @@ impl<'a> SampleSet<'a> {
 
     /// All error figures of the original.
     pub fn floor(&self) -> ErrorFigures {
-        self.figures_of(&self.original.0)
+        self.figures_of(&self.original.details)
     }
 
     /// Measures a variant.
@@ -259,14 +276,14 @@ impl<'a> SampleSet<'a> {
 
     /// Measures the programs of a variant.
     pub fn measure_programs(&self, programs: &Programs) -> Measured {
-        self.judge(&self.details(programs))
+        self.judge(&self.draw(programs))
     }
 
     /// Measures a variant, with all that was measured of it.
     pub(super) fn in_full(&self, programs: &Programs) -> (Details, Measured) {
-        let details = self.details(programs);
-        let measured = self.judge(&details);
-        (details.0, measured)
+        let drawn = self.draw(programs);
+        let measured = self.judge(&drawn);
+        (drawn.details, measured)
     }
 
     /// Whether two shaders draw the same pictures, to the last bit of what is displayed.
@@ -290,8 +307,8 @@ impl<'a> SampleSet<'a> {
     /// # Errors
     /// When the evaluator refuses it.
     pub fn figures(&self, shader: &Shader) -> Result<ErrorFigures, Refused> {
-        let (details, _) = self.details(&Programs::of(shader)?);
-        Ok(self.figures_of(&details))
+        let drawn = self.draw(&Programs::of(shader)?);
+        Ok(self.figures_of(&drawn.details))
     }
 
     /// FLIP of a variant: the mean over the pictures of the views and uniform samples, each at its first offset, over
@@ -339,15 +356,15 @@ impl<'a> SampleSet<'a> {
 
     /// Measures the original and a variant of it frame by frame: what a held-out split is judged by.
     pub(super) fn pair(&self, shader: &Shader) -> Result<(Details, &Details), Refused> {
-        let (details, _) = self.details(&Programs::of(shader)?);
-        Ok((details, &self.original.0))
+        let drawn = self.draw(&Programs::of(shader)?);
+        Ok((drawn.details, &self.original.details))
     }
 
     /// The tiles that use up the most of their bound, at most so many; none that use up less than [`CLOSE`].
     pub(super) fn worst_tiles(&self, details: &Details, most: usize) -> Tiles {
         let frames = self.frames.iter().enumerate();
         let places = frames.flat_map(|(i, frame)| frame.tiles().iter().map(move |tile| (i, *tile)));
-        let added = details.tiles.iter().zip(&self.original.0.tiles);
+        let added = details.tiles.iter().zip(&self.original.details.tiles);
         let added = added.map(|(level, original)| level - original);
         let mut worst: Vec<_> = added.zip(places).collect();
         worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -364,29 +381,35 @@ impl<'a> SampleSet<'a> {
 
     /// How much of its bound the worst of its tiles uses up.
     pub(super) fn strain_of_tiles(&self, programs: &Programs) -> f64 {
-        self.figures_of(&self.details(programs).0).strain_of_tiles()
+        self.figures_of(&self.draw(programs).details)
+            .strain_of_tiles()
     }
 
     pub(super) fn figures_of(&self, details: &Details) -> ErrorFigures {
         let scene = self.stand.scene;
         let bound = (scene.bound(self.distance), scene.reading);
-        ErrorFigures::new(details, &self.original.0, bound)
+        ErrorFigures::new(details, &self.original.details, bound)
     }
 
     /// What a variant costs by the scene's goal.
     pub(super) fn cost(&self, used: &Used) -> f64 {
-        self.stand.scene.goal.cost(used, &self.original.1)
+        self.stand.scene.goal.cost(used, &self.original.used)
     }
 
     /// A cost as a share of the original's; 1 where that costs nothing.
     pub(super) fn share(&self, cost: f64) -> f64 {
-        let whole = self.cost(&self.original.1);
+        let whole = self.cost(&self.original.used);
         if whole > 0.0 { cost / whole } else { 1.0 }
     }
 
-    fn judge(&self, (details, used): &(Details, Used)) -> Measured {
+    fn judge(&self, drawn: &Drawn) -> Measured {
+        let Drawn {
+            details,
+            used,
+            invocation,
+        } = drawn;
         let figures = self.figures_of(details);
-        let added = details.error.square() - self.original.0.error.square();
+        let added = details.error.square() - self.original.details.error.square();
         let most = self.stand.scene.host.most_texture_bytes;
         let too_large = most.is_some_and(|most| used.generated_bytes > most);
         Measured {
@@ -399,17 +422,18 @@ impl<'a> SampleSet<'a> {
             load: added / figures.bound.max(LEAST_BOUND).powi(2),
             used: *used,
             cost: self.cost(used),
+            invocation: *invocation,
         }
     }
 
     /// What one squared difference of one pixel adds to the load.
     pub(super) fn load_of_square(&self) -> f64 {
         let bound = self.stand.scene.bound(self.distance).max(LEAST_BOUND);
-        1.0 / (bound.powi(2) * self.original.0.error.coverage.max(1.0))
+        1.0 / (bound.powi(2) * self.original.details.error.coverage.max(1.0))
     }
 
     /// Draws every frame at every offset.
-    fn details(&self, programs: &Programs) -> (Details, Used) {
+    fn draw(&self, programs: &Programs) -> Drawn {
         let output = self.stand.scene.output;
         let results: Vec<_> = self
             .frames
@@ -420,6 +444,9 @@ impl<'a> SampleSet<'a> {
         for (_, (_, executed)) in &results {
             all.fragments += executed.fragments;
             all.work += executed.work;
+            all.mix += executed.mix;
+            all.vertices += executed.vertices;
+            all.vertex_mix += executed.vertex_mix;
             all.drawn += executed.drawn;
             all.elsewhere += executed.elsewhere;
         }
@@ -435,7 +462,68 @@ impl<'a> SampleSet<'a> {
             texture_bytes: scene.texture_bytes(&programs.textures) + made,
             generated_bytes: made,
         };
-        (Details::new(frames), used)
+        let read = programs.fragment.read_inputs();
+        let (mut interpolated, mut flat) = (0.0, 0.0);
+        for slot in read.filter(|slot| matches!(slot.binding, Binding::Location { .. })) {
+            match (slot.kind, slot.interpolation) {
+                (
+                    ScalarKind::Float,
+                    None | Some(Interpolation::Perspective | Interpolation::Linear),
+                ) => {
+                    interpolated += 1.0;
+                }
+                _ => flat += 1.0,
+            }
+        }
+        Drawn {
+            details: Details::new(frames),
+            used,
+            invocation: Invocation {
+                fragment: all.mix * (1.0 / all.fragments.max(1) as f64),
+                vertex: all.vertex_mix * (1.0 / all.vertices.max(1) as f64),
+                interpolated,
+                flat,
+            },
+        }
+    }
+
+    /// What one draw of the object executes with what a variant's invocations do, over the whole pictures of the scene's
+    /// frames at this distance.
+    pub fn features(&self, measured: &Measured) -> Features {
+        Features {
+            invocation: measured.invocation,
+            extent: *self.extent.get_or_init(|| self.extent()),
+        }
+    }
+
+    fn extent(&self) -> Extent {
+        let Stand { vertex, scene, .. } = self.stand;
+        let frames = scene.frames(self.distance);
+        let shapes: Vec<Shape> = frames
+            .par_iter()
+            .map(|frame| shape(vertex, frame))
+            .collect();
+        let mean = |of: fn(&Shape) -> u64| {
+            shapes.iter().map(of).sum::<u64>() as f64 / shapes.len().max(1) as f64
+        };
+        let fed = vertex.read_inputs();
+        let fed = fed.filter(|slot| matches!(slot.binding, Binding::Location { .. }));
+        let mesh = frames.first().map(|frame: &Frame| &frame.mesh);
+        // A target of four bytes, or those that the lighting reads, and depth.
+        let colours = scene
+            .lighting
+            .as_ref()
+            .map_or(4, SceneLighting::target_bytes);
+        Extent {
+            fragments: mean(|shape| shape.fragments),
+            lanes: 4.0 * mean(|shape| shape.quads),
+            stamp_lanes: 16.0 * mean(|shape| shape.stamps),
+            drawn_triangles: mean(|shape| shape.triangles),
+            triangles: mesh.map_or(0.0, |mesh| (mesh.indices.len() / 3) as f64),
+            vertices: mesh.map_or(0.0, |mesh| mesh.positions.len() as f64),
+            vertex_bytes: 4.0 * fed.count() as f64,
+            target_bytes: f64::from(colours + 4),
+        }
     }
 }
 
@@ -464,6 +552,60 @@ pub(crate) fn offsets(count: usize, seed: u64) -> Vec<[f32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compile::normal_form;
+    use crate::eval::mix::{Class, Mix};
+    use crate::front::Source;
+    use lodc_passes::Stage;
+    use std::path::Path;
+
+    #[test]
+    fn features_are_what_a_draw_executes() {
+        let source = Source::parse(
+            "pane.wgsl",
+            "struct Out { @builtin(position) at: vec4f, @location(0) uv: vec2f, @location(1) @interpolate(flat) k: u32 }
+             @vertex fn vs_main(@location(0) at: vec3f, @location(1) uv: vec2f) -> Out {
+                 return Out(vec4f(at.xy, 0.5, 1.0), uv * 2.0, 7);
+             }
+             @fragment fn fs_main(in: Out) -> @location(0) vec4f {
+                 return vec4f(vec3f(sqrt(in.uv.x) * 0.9 + in.uv.y * f32(in.k)), 1.0);
+             }",
+        )
+        .expect("it parses");
+        let text = "resolution = [32, 32]\n[attributes]\nat = \"position\"\nuv = \"uv\"\n";
+        let scene = Scene::resolve(&source, Some((Path::new("a.toml"), text)));
+        let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+        let base = normal_form(&source).expect("it is small");
+        let vertex = base.index(Stage::Vertex).expect("it has one");
+        let vertex = Program::compile(base.module(), vertex, &[]).expect("it runs");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let set = SampleSet::new(&stand, scene.nearest, Samples::Search).expect("it runs");
+        let Features { invocation, extent } = set.features(&set.original());
+        let of = |counts: &[(Class, f64)]| {
+            let mut mix = Mix::default();
+            counts
+                .iter()
+                .for_each(|(class, count)| mix[*class] = *count);
+            mix
+        };
+        let fragment = [(Class::Float, 3.0), (Class::Word, 1.0), (Class::Root, 1.0)];
+        assert_eq!(invocation.fragment, of(&fragment));
+        assert_eq!(invocation.vertex, of(&[(Class::Float, 2.0)]));
+        assert_eq!((invocation.interpolated, invocation.flat), (2.0, 1.0));
+        let mesh = &scene.mesh;
+        assert_eq!(extent.vertices, mesh.positions.len() as f64);
+        assert_eq!(extent.triangles, (mesh.indices.len() / 3) as f64);
+        // Of the position two components are read.
+        assert_eq!((extent.vertex_bytes, extent.target_bytes), (16.0, 8.0));
+        assert!(
+            extent.fragments > 0.0 && extent.lanes > extent.fragments,
+            "{extent:?}"
+        );
+        assert!(extent.stamp_lanes > extent.lanes, "{extent:?}");
+    }
 
     #[test]
     fn offsets_are_spread_over_the_pixel_and_repeat() {

@@ -14,6 +14,7 @@ mod recall;
 mod textures;
 
 use super::lane::{LANES, Lane, Mask, Words};
+use super::mix::Mix;
 use super::program::Program;
 use super::program::code::{Case, Instruction, Register, Step};
 use super::texture::{Sampler, Texture};
@@ -68,6 +69,8 @@ pub struct Profile {
     /// Work that those lanes executed, in total (divide by `lanes` for the mean). A discarded lane
     /// works no more.
     pub work: Work,
+    /// What they executed by class, in total.
+    pub mix: Mix,
     /// For each probe of the program and each of its components: what covered active lanes held.
     pub probes: Vec<Vec<Probe>>,
     /// For each probe of a value beside an operand, and each component of the value.
@@ -84,6 +87,7 @@ impl Profile {
     pub fn absorb(&mut self, later: &Self) {
         self.lanes += later.lanes;
         self.work += later.work;
+        self.mix += later.mix;
         self.ran_away += later.ran_away;
         self.endless = self.endless.or(later.endless);
         if self.probes.is_empty() && self.pairs.is_empty() {
@@ -384,12 +388,17 @@ impl<'a, R: Lane> Machine<'a, R> {
     /// What has been run so far.
     pub fn profile(&self) -> Profile {
         let mut work = Work::default();
-        for (&count, &each) in self.counts.iter().zip(&self.program.work) {
+        let mut mix = self.program.prologue * self.lanes as f64;
+        let executed = self.program.executed.iter();
+        for ((&count, &each), executed) in self.counts.iter().zip(&self.program.work).zip(executed)
+        {
             work += each * count as f64;
+            mix += executed.mix(&self.textures, &self.samplers) * count as f64;
         }
         Profile {
             lanes: self.lanes,
             work,
+            mix,
             probes: self.probes.clone(),
             pairs: self.pairs.clone(),
             ran_away: self.lost,

@@ -8,6 +8,7 @@
 //! ```
 
 pub(super) mod code;
+pub(super) mod executed;
 mod expression;
 mod ir;
 mod lower;
@@ -20,6 +21,8 @@ mod uniform;
 pub use opacity::Opacity;
 pub use refused::Refused;
 
+use crate::mix::Mix;
+use executed::Executed;
 use lodc_passes::Work;
 use naga::{
     Binding, Expression, FunctionArgument, FunctionResult, Handle, Interpolation, Module,
@@ -35,6 +38,10 @@ pub struct Program {
     discards: bool,
     /// What a lane that is counted has worked, by count.
     pub(super) work: Vec<Work>,
+    /// The same by class.
+    pub(super) executed: Vec<Executed>,
+    /// What every lane executes of the prologue.
+    pub(super) prologue: Mix,
     pub(super) buffers: Vec<(u32, u32)>,
     pub(super) textures: Vec<(u32, u32)>,
     pub(super) samplers: Vec<(u32, u32)>,
@@ -141,12 +148,15 @@ impl Program {
         simplify::simplify(&mut ir);
         let homes = uniform::Homes::of(&ir);
         let uniformity = uniform::analyse(&ir, &homes);
+        let (executed, prologue) = executed::executed(&ir, &uniformity);
         Ok(Self {
             code: registers::write(&ir, &homes, &uniformity),
             inputs: inputs(module, &function.arguments),
             outputs: outputs(module, function.result.as_ref()),
             discards: ir.discards,
             work: ir.work,
+            executed,
+            prologue,
             buffers: ir.buffers,
             textures: ir.textures,
             samplers: ir.samplers,
@@ -159,6 +169,12 @@ impl Program {
     /// The scalars that each lane is given, in the order of the entry point's arguments, flattened.
     pub fn inputs(&self) -> &[Slot] {
         &self.inputs
+    }
+
+    /// The same, of those that it reads.
+    pub fn read_inputs(&self) -> impl Iterator<Item = &Slot> {
+        let read = self.inputs.iter().zip(&self.code.inputs);
+        read.filter_map(|(slot, read)| read.is_some().then_some(slot))
     }
 
     /// The scalars that each lane returns, in the order of the result, flattened.

@@ -107,6 +107,18 @@ impl Format {
         }
     }
 
+    /// How many bytes a pixel of it takes.
+    pub fn bytes(self) -> u32 {
+        let bits = match self.coding {
+            Unorm1010102 | Half11 => return 4,
+            Unorm(255) | Snorm(127) | Srgb => 8,
+            Unorm(_) | Snorm(_) | Half => 16,
+            Single => 32,
+            Uint(bits) | Sint(bits) => bits,
+        };
+        bits / 8 * self.components as u32
+    }
+
     /// What is read back of a colour that was written: rounded to the nearest number that there is, limited to
     /// what there is. A NaN is 0 where there is none.
     pub fn store(self, colour: [f32; 4]) -> [f32; 4] {

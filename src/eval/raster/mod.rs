@@ -13,12 +13,14 @@
 mod more;
 mod part;
 mod quads;
+mod shape;
 #[cfg(test)]
 mod tests;
 mod triangle;
 mod vertices;
 
 pub(crate) use quads::Quad;
+pub(crate) use shape::{Shape, shape};
 #[cfg(feature = "gpu")]
 pub(crate) use vertices::{attribute, hand_over_the_same, profile as vertex_profile};
 
@@ -31,6 +33,7 @@ use crate::scene::camera::Shot;
 use crate::scene::mesh::Mesh;
 use naga::{Binding, BuiltIn};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The longest edge of a frame in fine pixels (`width * grid`).
@@ -170,28 +173,11 @@ fn cover(
     target: &Target,
     (late, states): (bool, &Arc<[DrawState]>),
 ) -> Coverage {
-    let mut triangles = Vec::new();
-    // Where the triangles of each draw end.
-    let mut ends = Vec::new();
-    // Those of blended draws.
-    let mut blended = Vec::new();
-    for (number, draw) in mesh.draws().into_iter().enumerate() {
-        let state = state_of(states, number);
-        let indices = mesh
-            .indices
-            .get(3 * draw.triangles.start..3 * draw.triangles.end);
-        let corners = indices.unwrap_or_default().chunks_exact(3).enumerate();
-        let first = triangles.len();
-        triangles.extend(corners.filter_map(|(i, corners)| {
-            let corners = [corners[0], corners[1], corners[2]];
-            triangle::Triangle::new(i as u32, corners, &vertices.positions, target)
-                .filter(|triangle| triangle.front || !state.front_only)
-        }));
-        ends.push(triangles.len());
-        if state.blend != Blend::Opaque {
-            blended.push(first..triangles.len());
-        }
-    }
+    let Triangles {
+        triangles,
+        ends,
+        blended,
+    } = Triangles::of(&vertices.positions, mesh, target, states);
     let quads = if late {
         quads::in_order(&triangles)
     } else {
@@ -211,6 +197,45 @@ fn cover(
         late,
         states: states.clone(),
         vertex_profile: vertices.profile,
+    }
+}
+
+/// The triangles of a mesh that may cover something, draw by draw.
+struct Triangles {
+    triangles: Vec<triangle::Triangle>,
+    /// Where the triangles of each draw end.
+    ends: Vec<usize>,
+    /// Those of blended draws.
+    blended: Vec<Range<usize>>,
+}
+
+impl Triangles {
+    fn of(positions: &[[f32; 4]], mesh: &Mesh, target: &Target, states: &Arc<[DrawState]>) -> Self {
+        let mut triangles = Vec::new();
+        let mut ends = Vec::new();
+        let mut blended = Vec::new();
+        for (number, draw) in mesh.draws().into_iter().enumerate() {
+            let state = state_of(states, number);
+            let indices = mesh
+                .indices
+                .get(3 * draw.triangles.start..3 * draw.triangles.end);
+            let corners = indices.unwrap_or_default().chunks_exact(3).enumerate();
+            let first = triangles.len();
+            triangles.extend(corners.filter_map(|(i, corners)| {
+                let corners = [corners[0], corners[1], corners[2]];
+                triangle::Triangle::new(i as u32, corners, positions, target)
+                    .filter(|triangle| triangle.front || !state.front_only)
+            }));
+            ends.push(triangles.len());
+            if state.blend != Blend::Opaque {
+                blended.push(first..triangles.len());
+            }
+        }
+        Self {
+            triangles,
+            ends,
+            blended,
+        }
     }
 }
 

@@ -342,7 +342,7 @@ impl Fragment {
 }
 
 /// The pixels of a quad whose bits are set.
-fn pixels(x: u32, y: u32, mask: u8) -> impl Iterator<Item = (u32, u32)> {
+pub(super) fn pixels(x: u32, y: u32, mask: u8) -> impl Iterator<Item = (u32, u32)> {
     (0..4)
         .filter(move |i| mask >> i & 1 == 1)
         .map(move |i| (x + (i & 1), y + (i >> 1)))

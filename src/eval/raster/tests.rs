@@ -1,7 +1,7 @@
 //! Coverage and inputs against results computed by hand. Vertices are given as if the vertex program had run.
 
 use super::vertices::Vertices;
-use super::{Block, Coverage, Target, cover};
+use super::{Block, Coverage, Shape, Target, Triangles, cover};
 use crate::eval::draw::{Blend, DrawState};
 use crate::eval::lane::LANES;
 use crate::eval::machine::Profile;
@@ -71,35 +71,49 @@ impl Case {
         }
     }
 
+    fn target(&self) -> Target {
+        Target {
+            width: self.size.0 * self.grid,
+            height: self.size.1 * self.grid,
+            grid: self.grid,
+            offset: self.offset,
+        }
+    }
+
+    fn mesh(&self) -> Mesh {
+        Mesh {
+            positions: vec![[0.0; 3]; self.positions.len()],
+            indices: self.indices.clone(),
+            draws: (0..self.states.len())
+                .map(|i| Draw {
+                    vertices: 3 * i..3 * i + 3,
+                    triangles: i..i + 1,
+                })
+                .collect(),
+            ..Mesh::default()
+        }
+    }
+
+    fn shape(&self) -> Shape {
+        let states = self.states.clone().into();
+        let target = self.target();
+        let triangles = Triangles::of(&self.positions, &self.mesh(), &target, &states);
+        Shape::of(&triangles, &target)
+    }
+
     fn cover(&self, inputs: &[Slot]) -> Coverage {
         let vertices = Vertices {
             positions: self.positions.clone(),
             outputs: vec![self.values.iter().map(|v| v.to_bits()).collect()],
             profile: Profile::default(),
         };
-        let target = Target {
-            width: self.size.0 * self.grid,
-            height: self.size.1 * self.grid,
-            grid: self.grid,
-            offset: self.offset,
-        };
         let outputs = [float(0, Interpolation::Perspective)];
         cover(
             vertices,
             &outputs,
             inputs,
-            &Mesh {
-                positions: vec![[0.0; 3]; self.positions.len()],
-                indices: self.indices.clone(),
-                draws: (0..self.states.len())
-                    .map(|i| Draw {
-                        vertices: 3 * i..3 * i + 3,
-                        triangles: i..i + 1,
-                    })
-                    .collect(),
-                ..Mesh::default()
-            },
-            &target,
+            &self.mesh(),
+            &self.target(),
             (self.late, &self.states.clone().into()),
         )
     }
@@ -527,4 +541,45 @@ fn blended_draws_are_tested_against_opaque_ones_and_hide_nothing() {
         fragments(&case.cover(&[])).count(),
         3 * fronts[0] + fronts[3]
     );
+}
+
+#[test]
+fn a_device_shades_what_is_not_hidden_yet() {
+    // The whole picture of 8 x 8, behind, and before it two pixels of quads side by side.
+    let far = [
+        at(0.0, 0.0, 0.5, 1.0),
+        at(0.0, 16.0, 0.5, 1.0),
+        at(16.0, 0.0, 0.5, 1.0),
+    ];
+    let near = [
+        at(1.0, 0.0, 0.2, 1.0),
+        at(1.0, 1.0, 0.2, 1.0),
+        at(5.0, 0.0, 0.2, 1.0),
+    ];
+    let corners: Vec<[f32; 4]> = far.into_iter().chain(near).collect();
+    let back_to_front = Case::new(&corners, &[0, 1, 2, 3, 4, 5]);
+    let whole = Shape {
+        fragments: 64,
+        quads: 16,
+        stamps: 4,
+        triangles: 2,
+    };
+    let front_to_back = Case::new(&corners, &[3, 4, 5, 0, 1, 2]);
+    let [back, front] = [&back_to_front, &front_to_back].map(Case::shape);
+    assert_eq!(front.fragments, whole.fragments);
+    assert_eq!(front.quads, whole.quads + 2);
+    assert_eq!(back.fragments, whole.fragments + 2);
+    assert_eq!(
+        (back.quads, back.stamps),
+        (whole.quads + 2, whole.stamps + 1)
+    );
+    assert_eq!((front.stamps, front.triangles), (whole.stamps + 1, 2));
+    // What is blended hides nothing.
+    let glass = DrawState {
+        blend: Blend::Alpha,
+        ..DrawState::default()
+    };
+    let mut blended = front_to_back;
+    blended.states = vec![glass; 2];
+    assert_eq!(blended.shape().fragments, back.fragments);
 }

@@ -1,0 +1,3 @@
+//! Run times: what is measured of them, and what is predicted.
+
+pub mod model;
