@@ -35,6 +35,31 @@ pub(crate) fn pipeline_constant(module: &Module) -> Option<(Handle<Override>, St
     Some((handle, key))
 }
 
+/// The buffer of a module that holds a number of that name, by group and binding, and the number's place there, in bytes:
+/// the author's, or what `--form uniform` declares.
+#[cfg(feature = "gpu")]
+pub(crate) fn in_buffer(module: &Module) -> Option<((u32, u32), u32)> {
+    let is_number = |ty| module.types[ty].inner == TypeInner::Scalar(Scalar::F32);
+    module.global_variables.iter().find_map(|(_, variable)| {
+        let at = variable.binding.as_ref()?;
+        let at = (at.group, at.binding);
+        let named = |name: &Option<String>| name.as_deref() == Some(NAME);
+        match (&variable.space, &module.types[variable.ty].inner) {
+            (
+                AddressSpace::Uniform | AddressSpace::Storage { .. },
+                TypeInner::Struct { members, .. },
+            ) => {
+                let own = members.iter().find(|m| named(&m.name) && is_number(m.ty))?;
+                Some((at, own.offset))
+            }
+            (AddressSpace::Uniform | AddressSpace::Storage { .. }, _) => {
+                (named(&variable.name) && is_number(variable.ty)).then_some((at, 0))
+            }
+            _ => None,
+        }
+    })
+}
+
 impl Control {
     /// Finds the author's, or makes one in this form, for the fragment stage alone or for both.
     ///

@@ -145,7 +145,8 @@ impl Gpu {
             | Features::SHADER_F16
             | Features::PRIMITIVE_INDEX
             | Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES
-            | Features::TIMESTAMP_QUERY;
+            | Features::TIMESTAMP_QUERY
+            | Features::PIPELINE_STATISTICS_QUERY;
         let descriptor = wgpu::DeviceDescriptor {
             required_features: adapter.features() & wanted,
             required_limits: adapter.limits(),

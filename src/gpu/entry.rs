@@ -170,23 +170,7 @@ pub(super) fn fragment(
         let ty = around.ty(TypeInner::Scalar(Scalar::F32));
         returned.push((Binding::BuiltIn(BuiltIn::FragDepth), ty, depth));
     }
-    let mut members = Vec::new();
-    let mut components = Vec::new();
-    let mut offset = 0;
-    let mut add = |around: &mut Around, binding, inner, value| {
-        let size = match inner {
-            TypeInner::Scalar(_) => 4,
-            _ => 16,
-        };
-        members.push(StructMember {
-            name: Some(format!("out_{}", letter(members.len()))),
-            ty: around.ty(inner),
-            binding: Some(binding),
-            offset,
-        });
-        components.push(value);
-        offset += size;
-    };
+    let mut outputs = Vec::new();
     for (at, colour) in (0..).zip(&targets.colours) {
         let found = returned.iter().find(
             |(binding, ..)| matches!(binding, Binding::Location { location, .. } if *location == colour.location),
@@ -202,28 +186,58 @@ pub(super) fn fragment(
             });
         }
         let inner = four(scalar(colour.kind.unwrap_or(ScalarKind::Uint)));
-        add(&mut around, location(at), inner, value);
+        outputs.push((location(at), inner, value));
     }
     let drawn = order.unwrap_or_else(|| around.literal(Literal::U32(1)));
     let at = targets.colours.len() as u32;
-    add(
-        &mut around,
-        location(at),
-        TypeInner::Scalar(Scalar::U32),
-        drawn,
-    );
+    outputs.push((location(at), TypeInner::Scalar(Scalar::U32), drawn));
     for (binding, ty, value) in returned {
         if let Binding::BuiltIn(_) = binding {
             let inner = around.module.types[ty].inner.clone();
-            add(&mut around, binding, inner, value);
+            outputs.push((binding, inner, value));
         }
     }
-    let ty = around.ty(TypeInner::Struct {
-        members,
-        span: offset.next_multiple_of(16),
-    });
-    let value = around.emit(Expression::Compose { ty, components });
-    around.finish(Some(FunctionResult { ty, binding: None }), Some(value))
+    around.returning(outputs)
+}
+
+/// The module with the one entry point at `entry`, as it is but for its name, [`NAME`].
+pub(super) fn alone(module: &Module, entry: usize) -> Module {
+    let mut module = module.clone();
+    let mut own = module.entry_points.swap_remove(entry);
+    own.name = NAME.to_owned();
+    module.entry_points = vec![own];
+    module
+}
+
+/// The module with one fragment entry point, [`NAME`], that returns these colours at their own locations: the one at
+/// `entry` itself, or, where that returns fewer components or others than the targets hold, one around it.
+pub(super) fn bare(module: &Module, entry: usize, place: (u32, u32), targets: &Targets) -> Module {
+    let mut around = Around::new(module, entry, place);
+    let arguments = around.arguments(|_, position| position);
+    let (result, returned) = around.call(arguments);
+    let returned = around.returned(result, returned);
+    let mut own = true;
+    let mut outputs = Vec::new();
+    for colour in &targets.colours {
+        let kind = colour.kind.unwrap_or(ScalarKind::Float);
+        let at = |binding: &Binding| matches!(binding, Binding::Location { location, .. } if *location == colour.location);
+        let found = returned.iter().find(|(binding, ..)| at(binding));
+        let found = found.map(|(_, ty, value)| (*ty, *value));
+        let inner = four(scalar(kind));
+        own &= found.is_some_and(|(ty, _)| around.module.types[ty].inner == inner);
+        let value = around.colour(found, kind);
+        outputs.push((location(colour.location), inner, value));
+    }
+    if own {
+        return alone(module, entry);
+    }
+    for (binding, ty, value) in returned {
+        if let Binding::BuiltIn(_) = binding {
+            let inner = around.module.types[ty].inner.clone();
+            outputs.push((binding, inner, value));
+        }
+    }
+    around.returning(outputs)
 }
 
 fn is_position(binding: Option<&Binding>) -> bool {
@@ -651,6 +665,33 @@ impl Around {
         }
         let ty = self.ty(four(scalar(kind)));
         self.emit(Expression::Compose { ty, components })
+    }
+
+    /// The module, its entry point returning these.
+    fn returning(mut self, outputs: Vec<(Binding, TypeInner, Handle<Expression>)>) -> Module {
+        let mut members = Vec::new();
+        let mut components = Vec::new();
+        let mut offset = 0;
+        for (binding, inner, value) in outputs {
+            let size = match inner {
+                TypeInner::Scalar(_) => 4,
+                _ => 16,
+            };
+            members.push(StructMember {
+                name: Some(format!("out_{}", letter(members.len()))),
+                ty: self.ty(inner),
+                binding: Some(binding),
+                offset,
+            });
+            components.push(value);
+            offset += size;
+        }
+        let ty = self.ty(TypeInner::Struct {
+            members,
+            span: offset.next_multiple_of(16),
+        });
+        let value = self.emit(Expression::Compose { ty, components });
+        self.finish(Some(FunctionResult { ty, binding: None }), Some(value))
     }
 
     fn finish(

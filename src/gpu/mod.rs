@@ -6,6 +6,7 @@
 //! Pipeline x Frame --resources, render--> Drawn     colour and coverage, in textures on the device
 //! Drawn --read--> Picture                           as the evaluator gives it
 //! Drawn x Drawn --error--> [TileSum]                what differs, added up on the device
+//! Timed x [Timed] --time--> [Timing]                how long they take beside the original
 //! ```
 //!
 //! It is the only folder that names wgpu, and it does not know the search. What goes wrong on a device is a
@@ -25,6 +26,7 @@ mod pass;
 mod read;
 mod render;
 mod resources;
+pub mod time;
 mod vertices;
 pub mod worker;
 

@@ -3,11 +3,11 @@
 use super::adapter::Gpu;
 use super::entry::{self, Place, Targets};
 use super::render::Stages;
-use super::resources::{self, Bound, Slot, Slots, Uploads};
+use super::resources::{self, Bound, Buffers, Slot, Slots, Uploads};
 use super::vertices::Layout;
 use super::{blend, lavapipe, opengl};
-use crate::emit::control::pipeline_constant;
-use crate::eval::draw::{Blend, state_of};
+use crate::emit::control::{in_buffer, pipeline_constant};
+use crate::eval::draw::{Blend, DrawState, state_of};
 use crate::eval::raster::Frame;
 use crate::{Diagnostic, Result};
 use naga::Module;
@@ -16,6 +16,7 @@ use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use wgpu::{BufferBindingType, CompareFunction, ShaderStages, TextureFormat, TextureUsages};
 
 /// The format of colours: the bits of four floats, so that nothing is rounded away, on any device.
@@ -28,13 +29,15 @@ pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// A shader with what it draws to, compiled.
 #[derive(Debug)]
 pub(super) struct Pass {
-    pipeline: wgpu::RenderPipeline,
-    /// The same without back faces, where a draw wants that.
-    of_fronts: Option<wgpu::RenderPipeline>,
+    /// One for each way in which a draw gets to the targets.
+    pipelines: Vec<(DrawState, wgpu::RenderPipeline)>,
+    bare: bool,
     slots: Slots,
     groups: Vec<Option<wgpu::BindGroupLayout>>,
     /// Where the frame's place is bound.
     place: (u32, u32),
+    /// Where autoLOD is in a buffer, and what it is.
+    auto_lod: Option<(InBuffer, f32)>,
     layout: Layout,
     /// The formats that it draws to, in order; the coverage's behind them.
     formats: Vec<TextureFormat>,
@@ -53,6 +56,28 @@ pub(super) struct Drawing {
     pub(super) depth: Option<CompareFunction>,
     /// Whether some of its draws are without their back faces.
     pub(super) fronts: bool,
+    /// As an engine draws it: the shader's own entry points, whose colours alone are drawn, at their own locations, and
+    /// draws of these states, blended by the device.
+    pub(super) bare: Option<Vec<DrawState>>,
+}
+
+/// The buffer that holds a number, by group and binding, and the place there, in bytes.
+type InBuffer = ((u32, u32), u32);
+
+/// What a pass reads of a frame, ready to be drawn as often as wanted.
+#[derive(Debug)]
+pub(super) struct Ready {
+    mesh: Buffers,
+    draws: Vec<ReadyDraw>,
+}
+
+#[derive(Debug)]
+struct ReadyDraw {
+    state: DrawState,
+    groups: Vec<Option<wgpu::BindGroup>>,
+    /// In bytes.
+    vertices: Range<u64>,
+    indices: Range<u32>,
 }
 
 /// The images that it reads, by group and binding.
@@ -77,6 +102,29 @@ pub(super) fn free(stages: &Stages<'_>, nth: u32) -> (u32, u32) {
     (0, taken.max().unwrap_or(0) + nth)
 }
 
+impl Drawing {
+    /// The formats of what is drawn bare, by location.
+    pub(super) fn formats_by_location(&self) -> Vec<Option<TextureFormat>> {
+        let targets = self.states_of_targets().into_iter();
+        targets.map(|target| Some(target?.format)).collect()
+    }
+
+    /// The targets, by location.
+    fn states_of_targets(&self) -> Vec<Option<wgpu::ColorTargetState>> {
+        let formats = self.formats.iter().map(|format| Some((*format).into()));
+        if self.bare.is_none() {
+            return formats.chain([Some(COVERED.into())]).collect();
+        }
+        let mut targets = Vec::new();
+        for (colour, format) in self.targets.colours.iter().zip(formats) {
+            let at = colour.location as usize;
+            targets.resize(targets.len().max(at + 1), None);
+            targets[at] = format;
+        }
+        targets
+    }
+}
+
 impl Pass {
     /// Compiles a shader.
     ///
@@ -84,14 +132,26 @@ impl Pass {
     /// When the device cannot draw it.
     pub(super) fn new(gpu: &Gpu, stages: Stages<'_>, drawing: Drawing) -> Result<Self> {
         let place = free(&stages, 0);
+        let bare = drawing.bare.is_some();
+        let in_buffer = [stages.fragment.0, stages.vertex.0]
+            .into_iter()
+            .find_map(in_buffer)
+            .filter(|_| bare);
         let (module, at) = stages.vertex;
         let auto_lod = (stages.auto_lod).filter(|_| pipeline_constant(module).is_some());
         let (module, at) = settled(gpu, (module, at), auto_lod, place)?;
         let layout = Layout::new(&module, at)?;
-        let vertex = entry::vertex(&module, at, place);
+        let vertex = match bare {
+            true => entry::alone(&module, at),
+            false => entry::vertex(&module, at, place),
+        };
         let (module, at) = stages.fragment;
-        let (module, at) = settled(gpu, (module, at), stages.auto_lod, place)?;
-        let fragment = entry::fragment(&module, at, place, &drawing.targets);
+        let auto_lod = (stages.auto_lod).filter(|_| in_buffer.is_none());
+        let (module, at) = settled(gpu, (module, at), auto_lod, place)?;
+        let fragment = match bare {
+            true => entry::bare(&module, at, place, &drawing.targets),
+            false => entry::fragment(&module, at, place, &drawing.targets),
+        };
 
         let mut slots = Slots::default();
         for (module, stage) in [
@@ -120,12 +180,7 @@ impl Pass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &attributes,
         })];
-        let targets: Vec<Option<wgpu::ColorTargetState>> = drawing
-            .formats
-            .iter()
-            .chain([&COVERED])
-            .map(|format| Some((*format).into()))
-            .collect();
+        let targets = drawing.states_of_targets();
         let descriptor = wgpu::RenderPipelineDescriptor {
             label: None,
             layout: Some(&pipeline_layout),
@@ -156,20 +211,44 @@ impl Pass {
             multiview_mask: None,
             cache: None,
         };
-        let of_fronts = drawing.fronts.then(|| {
+        let opaque = |front_only| DrawState {
+            blend: Blend::Opaque,
+            front_only,
+        };
+        let states = match &drawing.bare {
+            Some(states) => states.clone(),
+            None if drawing.fronts => vec![opaque(false), opaque(true)],
+            None => vec![opaque(false)],
+        };
+        let pipelines = states.into_iter().map(|state| {
             let mut descriptor = descriptor.clone();
-            descriptor.primitive.cull_mode = Some(wgpu::Face::Back);
-            device.create_render_pipeline(&descriptor)
+            let mut targets = targets.clone();
+            if state.front_only {
+                descriptor.primitive.cull_mode = Some(wgpu::Face::Back);
+            }
+            if state.blend != Blend::Opaque {
+                if let Some(Some(first)) = targets.first_mut() {
+                    first.blend = blend::by_device(state.blend);
+                }
+                if let Some(depth) = &mut descriptor.depth_stencil {
+                    depth.depth_write_enabled = Some(false);
+                }
+            }
+            if let Some(fragment) = &mut descriptor.fragment {
+                fragment.targets = &targets;
+            }
+            (state, device.create_render_pipeline(&descriptor))
         });
         Ok(Self {
-            pipeline: device.create_render_pipeline(&descriptor),
-            of_fronts,
+            pipelines: pipelines.collect(),
+            bare,
             slots,
             groups,
             place,
+            auto_lod: in_buffer.zip(stages.auto_lod.map(|value| value as f32)),
             layout,
-            formats: drawing.formats,
             depth: drawing.depth.is_some(),
+            formats: drawing.formats,
         })
     }
 
@@ -186,47 +265,85 @@ impl Pass {
         images: &Images,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<()> {
+        let ready = self.ready((gpu, uploads), (frame, Some(blended)), before)?;
+        let mut pass = images.cleared(wgpu::Color::TRANSPARENT, 1.0, encoder);
+        self.record(&ready, &mut pass);
+        Ok(())
+    }
+
+    /// Binds what a frame's draws read: those that are blended, those that are not, or all, the blended ones last.
+    ///
+    /// # Errors
+    /// When the frame lacks what the shader reads.
+    pub(super) fn ready(
+        &self,
+        (gpu, uploads): (&Gpu, &mut Uploads),
+        (frame, blended): (&Frame, Option<bool>),
+        before: &Views,
+    ) -> Result<Ready> {
         let mesh = uploads.mesh(gpu, frame, &self.layout);
         let place = Place::new([frame.width, frame.height], frame.offset, frame.grid);
-        let mut bound = Vec::new();
+        let mut draws = Vec::new();
         for (number, draw) in frame.mesh.draws().into_iter().enumerate() {
             let state = state_of(&frame.states, number);
-            if (state.blend != Blend::Opaque) != blended {
+            if blended.is_some_and(|blended| (state.blend != Blend::Opaque) != blended) {
                 continue;
             }
             let place = place.of_draw(draw.triangles.start as u32, blend::number(state.blend));
-            let bind = |at: (u32, u32), slot: &Slot| match before.get(&at) {
+            let bind = |at: (u32, u32), slot: &Slot| match (before.get(&at), self.auto_lod) {
                 _ if at == self.place => {
                     let ty = BufferBindingType::Uniform;
                     Ok(Bound::Buffer(resources::buffer(gpu, &place.bytes(), ty)))
                 }
-                Some(view) => Ok(Bound::Texture(view.clone())),
-                None => uploads.bound(gpu, frame, number, at, slot),
+                (Some(view), _) => Ok(Bound::Texture(view.clone())),
+                (None, Some((((group, binding), offset), value))) if at == (group, binding) => {
+                    uploads.with_number(gpu, (frame, number, at, slot), (offset, value))
+                }
+                (None, _) => uploads.bound(gpu, frame, number, at, slot),
             };
-            bound.push((draw, state, self.bind_groups(gpu, bind)?));
-        }
-        let mut pass = images.cleared(wgpu::Color::TRANSPARENT, 1.0, encoder);
-        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        for (draw, state, groups) in &bound {
-            pass.set_pipeline(match &self.of_fronts {
-                Some(of_fronts) if state.front_only => of_fronts,
-                _ => &self.pipeline,
+            let groups = self.bind_groups(gpu, bind)?;
+            let stride = self.layout.stride();
+            draws.push(ReadyDraw {
+                // To pictures all is drawn as if it were opaque.
+                state: match self.bare {
+                    true => state,
+                    false => DrawState {
+                        blend: Blend::Opaque,
+                        ..state
+                    },
+                },
+                groups,
+                vertices: draw.vertices.start as u64 * stride..draw.vertices.end as u64 * stride,
+                indices: 3 * draw.triangles.start as u32..3 * draw.triangles.end as u32,
             });
-            if let Some(vertices) = &mesh.vertices {
-                let [first, end] = [draw.vertices.start, draw.vertices.end]
-                    .map(|vertex| vertex as u64 * self.layout.stride());
-                pass.set_vertex_buffer(0, vertices.slice(first..end));
+        }
+        draws.sort_by_key(|draw| draw.state.blend != Blend::Opaque);
+        Ok(Ready { mesh, draws })
+    }
+
+    /// Draws what is ready, in a pass over targets of the same formats.
+    pub(super) fn record(&self, ready: &Ready, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_index_buffer(ready.mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for draw in &ready.draws {
+            // Its own, or of all draws where no pipeline is.
+            let own = self
+                .pipelines
+                .iter()
+                .find(|(state, _)| *state == draw.state);
+            let Some((_, pipeline)) = own.or(self.pipelines.first()) else {
+                continue;
+            };
+            pass.set_pipeline(pipeline);
+            if let Some(vertices) = &ready.mesh.vertices {
+                pass.set_vertex_buffer(0, vertices.slice(draw.vertices.clone()));
             }
-            for (group, bound) in (0..).zip(groups) {
+            for (group, bound) in (0..).zip(&draw.groups) {
                 if let Some(bound) = bound {
                     pass.set_bind_group(group, bound, &[]);
                 }
             }
-            let [first, end] =
-                [draw.triangles.start, draw.triangles.end].map(|triangle| 3 * triangle as u32);
-            pass.draw_indexed(first..end, 0, 0..1);
+            pass.draw_indexed(draw.indices.clone(), 0, 0..1);
         }
-        Ok(())
     }
 
     fn bind_groups(

@@ -88,8 +88,8 @@ pub struct Drawn {
 /// Draws frames on a device, and keeps what it uploaded for them.
 #[derive(Debug)]
 pub struct Renderer<'g> {
-    gpu: &'g Gpu,
-    uploads: Uploads,
+    pub(super) gpu: &'g Gpu,
+    pub(super) uploads: Uploads,
 }
 
 /// What a lighting reads that the material drew.
@@ -132,20 +132,8 @@ impl<'g> Renderer<'g> {
     }
 
     fn deferred(&self, stages: Stages<'_>, lighting: &SceneLighting) -> Result<Kind> {
+        let material = self.material(lighting)?;
         let planes = planes(lighting);
-        let colours = planes.iter().map(|(location, format)| Colour {
-            location: *location,
-            kind: Some(format.kind()),
-        });
-        let formats = planes.iter().map(|(_, format)| self.target(*format));
-        let material = Drawing {
-            targets: Targets {
-                colours: colours.collect(),
-                ..Targets::default()
-            },
-            formats: formats.collect::<Result<_>>()?,
-            ..Drawing::forward()
-        };
         let light = Stages {
             vertex: lighting.vertex(),
             fragment: lighting.fragment(),
@@ -177,6 +165,27 @@ impl<'g> Renderer<'g> {
                 .into_iter()
                 .map(|(at, (before, _))| (at, before))
                 .collect(),
+        })
+    }
+
+    /// What a deferred material draws to: the colours that the lighting reads.
+    ///
+    /// # Errors
+    /// When the device cannot draw to a target's format.
+    pub(super) fn material(&self, lighting: &SceneLighting) -> Result<Drawing> {
+        let planes = planes(lighting);
+        let colours = planes.iter().map(|(location, format)| Colour {
+            location: *location,
+            kind: Some(format.kind()),
+        });
+        let formats = planes.iter().map(|(_, format)| self.target(*format));
+        Ok(Drawing {
+            targets: Targets {
+                colours: colours.collect(),
+                ..Targets::default()
+            },
+            formats: formats.collect::<Result<_>>()?,
+            ..Drawing::forward()
         })
     }
 

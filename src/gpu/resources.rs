@@ -295,6 +295,32 @@ impl Uploads {
         })
     }
 
+    /// The same of a buffer in which a number is set, at an offset in bytes. Where the scene has no buffer there, one that
+    /// is 0 but for the number.
+    ///
+    /// # Errors
+    /// When something else than a buffer is bound there.
+    pub(super) fn with_number(
+        &mut self,
+        gpu: &Gpu,
+        (frame, draw, at, slot): (&Frame, usize, (u32, u32), &Slot),
+        (offset, value): (u32, f32),
+    ) -> Result<Bound> {
+        let mut bytes = match frame.bindings.get(&at).and_then(|r| r.of_draw(draw)) {
+            Some(Resource::Buffer(bytes)) => bytes.to_vec(),
+            Some(_) => return self.bound(gpu, frame, draw, at, slot),
+            None => Vec::new(),
+        };
+        let BindingType::Buffer { ty, .. } = slot.ty else {
+            return self.bound(gpu, frame, draw, at, slot);
+        };
+        let offset = offset as usize;
+        let end = offset + 4;
+        bytes.resize(bytes.len().max(end), 0);
+        bytes[offset..end].copy_from_slice(&value.to_le_bytes());
+        Ok(Bound::Buffer(buffer(gpu, &bytes, ty)))
+    }
+
     fn texture(
         &mut self,
         gpu: &Gpu,

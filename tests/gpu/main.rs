@@ -16,6 +16,7 @@ mod parameters;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod shaders;
+mod time;
 mod vertices;
 mod worker;
 

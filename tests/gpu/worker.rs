@@ -7,7 +7,7 @@ use lodc::gpu::{Renderer, Stages};
 use std::path::PathBuf;
 use std::time::Duration;
 
-fn worker(adapter: &str) -> Worker {
+pub(crate) fn worker(adapter: &str) -> Worker {
     let program = PathBuf::from(env!("CARGO_BIN_EXE_lodc"));
     let patience = Duration::from_secs(120);
     Worker::new(program, Some(adapter.to_owned()), patience)

@@ -40,6 +40,24 @@ pub(super) fn number(blend: Blend) -> u32 {
     }
 }
 
+/// The same as a device blends, where colour and coverage are drawn to one target; `None` where nothing is blended.
+pub(super) fn by_device(blend: Blend) -> Option<wgpu::BlendState> {
+    use wgpu::BlendFactor::{One, OneMinusSrcAlpha, SrcAlpha, Zero};
+    let component = |src_factor, dst_factor| wgpu::BlendComponent {
+        src_factor,
+        dst_factor,
+        operation: wgpu::BlendOperation::Add,
+    };
+    let over = component(One, OneMinusSrcAlpha);
+    let (color, alpha) = match blend {
+        Blend::Opaque => return None,
+        Blend::Alpha => (component(SrcAlpha, OneMinusSrcAlpha), over),
+        Blend::Premultiplied => (over, over),
+        Blend::Additive => (component(SrcAlpha, One), component(Zero, One)),
+    };
+    Some(wgpu::BlendState { color, alpha })
+}
+
 /// A shader in a scene that blends, compiled.
 #[derive(Debug)]
 pub(super) struct Blended {

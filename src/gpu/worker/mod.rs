@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Worker --Request, as JSON--> child: `lodc gpu-worker`, which draws
-//! Worker <--Answer, as JSON, and the picture's bytes-- child
+//! Worker <--Answer, as JSON, and a picture's bytes-- child
 //! ```
 //!
 //! Each message is a length of four bytes, little-endian, and so many bytes of JSON; behind an answer come a length
@@ -18,6 +18,7 @@ pub use serve::serve;
 use crate::Diagnostic;
 use crate::diagnostic::Severity;
 use crate::front::{Definition, Modules, Stages};
+use crate::time::{Effort, Timing};
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -109,8 +110,21 @@ struct Request {
     /// A part of the adapter's name; `None` for the best.
     adapter: Option<String>,
     subject: Subject,
-    variant: Variant,
-    wanted: Wanted,
+    task: Task,
+}
+
+/// What is to be done with a subject.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+enum Task {
+    /// A picture is drawn.
+    Draw { variant: Variant, wanted: Wanted },
+    /// Variants are timed against the original.
+    Time {
+        variants: Vec<Variant>,
+        /// As [`Wanted::distance`].
+        distance: f64,
+        effort: Effort,
+    },
 }
 
 /// What it says.
@@ -118,6 +132,8 @@ struct Request {
 enum Answer {
     /// A picture in fine pixels; its colours and then its coverage are the numbers behind it.
     Picture { width: u32, height: u32 },
+    /// What was found of each variant; no numbers are behind it.
+    Timed(Vec<Result<Timing, Said>>),
     /// The device cannot, or the input is bad.
     Refused(Said),
 }
@@ -208,15 +224,17 @@ mod tests {
                 &Stages::default(),
                 &Modules::default(),
             ),
-            variant: Variant {
-                text: Some("fn é() {}".to_owned()),
-                auto_lod: Some(0.1),
-            },
-            wanted: Wanted {
-                distance: 2.5,
-                frame: 3,
-                offset: [0.1, -0.3],
-                grid: 4,
+            task: Task::Draw {
+                variant: Variant {
+                    text: Some("fn é() {}".to_owned()),
+                    auto_lod: Some(0.1),
+                },
+                wanted: Wanted {
+                    distance: 2.5,
+                    frame: 3,
+                    offset: [0.1, -0.3],
+                    grid: 4,
+                },
             },
         };
         let mut bytes = Vec::new();

@@ -1,8 +1,12 @@
 //! The parent: starts a child when it needs one, waits for its answer for so long, and ends it when there is none.
 
-use super::{Answer, Request, Subject, Variant, Wanted, read_message, read_numbers, write_message};
+use super::{
+    Answer, Request, Said, Subject, Task, Variant, Wanted, read_message, read_numbers,
+    write_message,
+};
 use crate::Diagnostic;
 use crate::eval::image::Picture;
+use crate::time::{Effort, Timing};
 use std::io::{BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -69,6 +73,12 @@ pub struct Worker {
     running: Option<Running>,
 }
 
+/// An answer to something else than was asked.
+fn confused() -> Box<Diagnostic> {
+    Diagnostic::error("the program that draws on the GPU answered something else")
+        .with_note("is it of the same version of lodc?")
+}
+
 /// What a child said: an answer with its numbers, or that there will be none.
 type Heard = std::io::Result<(Answer, Vec<f32>)>;
 
@@ -117,12 +127,15 @@ impl Worker {
         let request = Request {
             adapter: self.adapter.clone(),
             subject: subject.clone(),
-            variant: variant.clone(),
-            wanted,
+            task: Task::Draw {
+                variant: variant.clone(),
+                wanted,
+            },
         };
-        let (answer, numbers) = self.ask(&request)?;
+        let (answer, numbers) = self.ask(&request, self.patience)?;
         match answer {
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
+            Answer::Timed(_) => Err(Failure::Refused(confused())),
             Answer::Picture { width, height } => {
                 let count = width as usize * height as usize;
                 let (colours, covered) = numbers.split_at(numbers.len().min(4 * count));
@@ -136,7 +149,83 @@ impl Worker {
         }
     }
 
-    fn ask(&mut self, request: &Request) -> Result<(Answer, Vec<f32>), Failure> {
+    /// Times variants against the original at a distance, all the scene's views taken together: one answer each, in
+    /// their order. What one of them fails at, be it that the driver crashes or hangs, does not keep the others from
+    /// being timed.
+    ///
+    /// # Errors
+    /// When the original cannot be timed either.
+    pub fn time(
+        &mut self,
+        subject: &Subject,
+        variants: &[Variant],
+        distance: f64,
+        effort: &Effort,
+    ) -> Result<Vec<Result<Timing, Failure>>, Failure> {
+        if variants.is_empty() {
+            return Ok(Vec::new());
+        }
+        let failure = match self.time_together(subject, variants, distance, effort) {
+            Ok(timings) => return Ok(timings),
+            Err(failure @ Failure::NotStarted(_)) => return Err(failure),
+            Err(failure) => failure,
+        };
+        // One of them takes the child or the device with it, or the original does.
+        let once = Effort {
+            rounds_at_least: 1,
+            rounds_at_most: 1,
+            ..*effort
+        };
+        self.time_together(subject, &[Variant::default()], distance, &once)?;
+        if variants.len() == 1 {
+            return Ok(vec![Err(failure)]);
+        }
+        let mut timings = Vec::new();
+        for half in [
+            &variants[..variants.len() / 2],
+            &variants[variants.len() / 2..],
+        ] {
+            timings.extend(self.time(subject, half, distance, effort)?);
+        }
+        Ok(timings)
+    }
+
+    /// The same without another try.
+    fn time_together(
+        &mut self,
+        subject: &Subject,
+        variants: &[Variant],
+        distance: f64,
+        effort: &Effort,
+    ) -> Result<Vec<Result<Timing, Failure>>, Failure> {
+        let request = Request {
+            adapter: self.adapter.clone(),
+            subject: subject.clone(),
+            task: Task::Time {
+                variants: variants.to_vec(),
+                distance,
+                effort: *effort,
+            },
+        };
+        let count = variants.len() as u32;
+        // Each is compiled, as is the original; and rounds may take twice the budget.
+        let patience = self.patience * (count + 1) + effort.budget * 3 * count;
+        let (answer, _) = self.ask(&request, patience)?;
+        match answer {
+            Answer::Timed(timings) if timings.len() == variants.len() => {
+                let failed = |said: Said| Failure::Refused(said.error());
+                Ok(timings.into_iter().map(|t| t.map_err(failed)).collect())
+            }
+            Answer::Refused(said) => Err(Failure::Refused(said.error())),
+            _ => Err(Failure::Refused(confused())),
+        }
+    }
+
+    fn ask(
+        &mut self,
+        request: &Request,
+        patience: Duration,
+    ) -> Result<(Answer, Vec<f32>), Failure> {
         let mut running = match self.running.take() {
             Some(running) => running,
             None => Running::start(&self.program)?,
@@ -147,14 +236,14 @@ impl Worker {
         if write_message(requests, request).is_err() {
             return Err(running.crashed());
         }
-        match running.answers.recv_timeout(self.patience) {
+        match running.answers.recv_timeout(patience) {
             Ok(Ok(answer)) => {
                 self.running = Some(running);
                 Ok(answer)
             }
             Err(mpsc::RecvTimeoutError::Timeout) => {
                 running.end();
-                Err(Failure::Hung(self.patience))
+                Err(Failure::Hung(patience))
             }
             Ok(Err(_)) | Err(mpsc::RecvTimeoutError::Disconnected) => Err(running.crashed()),
         }

@@ -1,9 +1,14 @@
 //! The child: reads requests, draws, answers, until there are no more.
 
-use super::{Answer, Request, Said, Subject, Variant, read_message, write_message, write_numbers};
+use super::{
+    Answer, Request, Said, Subject, Task, Variant, Wanted, read_message, write_message,
+    write_numbers,
+};
 use crate::front::Source;
+use crate::gpu::time::{Place, Timed};
 use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
 use crate::scene::Scene;
+use crate::time::Effort;
 use crate::{Diagnostic, Result};
 use std::io::{Read, Write};
 use std::sync::Arc;
@@ -12,6 +17,8 @@ use std::sync::mpsc;
 
 /// How many pipelines are kept: those of a shader's levels, in turns.
 const KEPT: usize = 16;
+/// The same of those that are timed: the variants of a search come again at other distances.
+const KEPT_TIMED: usize = 128;
 
 /// Answers requests until `from` ends: what `lodc gpu-worker` does.
 ///
@@ -121,6 +128,8 @@ struct Loaded<'g> {
     renderer: Renderer<'g>,
     /// The last one that was used is the last one here.
     pipelines: Vec<(Variant, Pipeline)>,
+    /// The same of those that were timed.
+    timed: Vec<(Variant, Timed)>,
 }
 
 impl<'g> Loaded<'g> {
@@ -133,6 +142,7 @@ impl<'g> Loaded<'g> {
             source,
             renderer: Renderer::new(gpu),
             pipelines: Vec::new(),
+            timed: Vec::new(),
         })
     }
 
@@ -142,20 +152,7 @@ impl<'g> Loaded<'g> {
         let entry = match known {
             Some(at) => self.pipelines.remove(at),
             None => {
-                let text = match &variant.text {
-                    Some(text) => Some(Source::parse("variant.wgsl", &**text)?),
-                    None => None,
-                };
-                let source = text.as_ref().unwrap_or(&self.source);
-                let stages = Stages::of_source(source, &self.scene).ok_or_else(|| {
-                    Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
-                        .with_note("give it the vertex entry point of the shader")
-                })?;
-                let stages = Stages {
-                    auto_lod: variant.auto_lod,
-                    ..stages
-                };
-                let pipeline = self.renderer.pipeline(stages, &self.scene)?;
+                let pipeline = self.compiled(variant, Renderer::pipeline)?;
                 (variant.clone(), pipeline)
             }
         };
@@ -164,6 +161,31 @@ impl<'g> Loaded<'g> {
             self.pipelines.remove(0);
         }
         Ok(())
+    }
+
+    /// What is compiled of a variant's stages.
+    fn compiled<T>(
+        &self,
+        variant: &Variant,
+        compile: impl FnOnce(&Renderer<'g>, Stages<'_>, &Scene) -> Result<T>,
+    ) -> Result<T> {
+        let text = match &variant.text {
+            Some(text) => Some(Source::parse("variant.wgsl", &**text)?),
+            None => None,
+        };
+        let stages = self.stages(text.as_ref().unwrap_or(&self.source))?;
+        let stages = Stages {
+            auto_lod: variant.auto_lod,
+            ..stages
+        };
+        compile(&self.renderer, stages, &self.scene)
+    }
+
+    fn stages<'a>(&'a self, source: &'a Source) -> Result<Stages<'a>> {
+        Stages::of_source(source, &self.scene).ok_or_else(|| {
+            Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
+                .with_note("give it the vertex entry point of the shader")
+        })
     }
 }
 
@@ -176,14 +198,25 @@ fn answer<'g>(
         Some(loaded) if loaded.subject == request.subject => loaded,
         _ => Loaded::new(gpu, &request.subject)?,
     };
-    let drawn = draw(gpu, &mut loaded, request);
+    let answered = match &request.task {
+        Task::Draw { variant, wanted } => draw(gpu, &mut loaded, variant, *wanted),
+        Task::Time {
+            variants,
+            distance,
+            effort,
+        } => time(&mut loaded, variants, *distance, effort).map(|answer| (answer, Vec::new())),
+    };
     *subject = Some(loaded);
-    drawn
+    answered
 }
 
-fn draw(gpu: &Gpu, loaded: &mut Loaded<'_>, request: &Request) -> Result<(Answer, Vec<f32>)> {
-    loaded.compile(&request.variant)?;
-    let wanted = request.wanted;
+fn draw(
+    gpu: &Gpu,
+    loaded: &mut Loaded<'_>,
+    variant: &Variant,
+    wanted: Wanted,
+) -> Result<(Answer, Vec<f32>)> {
+    loaded.compile(variant)?;
     let mut frames = loaded.scene.frames(wanted.distance).into_iter();
     let Some(mut frame) = frames.nth(wanted.frame) else {
         return Err(Diagnostic::error(format!(
@@ -205,4 +238,74 @@ fn draw(gpu: &Gpu, loaded: &mut Loaded<'_>, request: &Request) -> Result<(Answer
         height: picture.height,
     };
     Ok((answer, numbers))
+}
+
+/// Times variants. They are compiled once, as long as they fit into what is kept.
+fn time(
+    loaded: &mut Loaded<'_>,
+    variants: &[Variant],
+    distance: f64,
+    effort: &Effort,
+) -> Result<Answer> {
+    let original = Variant::default();
+    let mut failed: Vec<Option<Said>> = Vec::new();
+    let mut kept = std::mem::take(&mut loaded.timed);
+    for variant in std::iter::once(&original).chain(variants) {
+        let known = kept.iter().position(|(v, _)| v == variant);
+        let compiled = match known {
+            Some(at) => Ok(kept.remove(at).1),
+            None => loaded.compiled(variant, Renderer::timed),
+        };
+        failed.push(match compiled {
+            Ok(timed) => {
+                kept.push((variant.clone(), timed));
+                None
+            }
+            Err(error) => Some(Said::of(*error)),
+        });
+    }
+    let over = kept
+        .len()
+        .saturating_sub(KEPT_TIMED.max(variants.len() + 1));
+    kept.drain(..over);
+    let find = |variant: &Variant| {
+        let found = kept.iter().find(|(v, _)| v == variant);
+        found.map(|(_, timed)| timed)
+    };
+    let mut failed = failed.into_iter();
+    let timings = match (failed.next().flatten(), find(&original)) {
+        (None, Some(original)) => {
+            let good: Vec<&Timed> = variants.iter().filter_map(find).collect();
+            let Loaded {
+                source,
+                scene,
+                renderer,
+                ..
+            } = loaded;
+            let stages = Stages::of_source(source, scene);
+            let stages = stages.ok_or_else(|| Diagnostic::error("nothing was compiled"));
+            stages.and_then(|stages| {
+                let place = Place {
+                    scene,
+                    stages,
+                    distance,
+                };
+                renderer.time(&place, original, &good, effort)
+            })
+        }
+        (said, _) => {
+            Err(said.map_or_else(|| Diagnostic::error("nothing was compiled"), Said::error))
+        }
+    };
+    loaded.timed = kept;
+    let mut timings = timings?.into_iter();
+    let answers = failed.map(|said| match said {
+        Some(said) => Err(said),
+        // One for each that was compiled.
+        None => match timings.next() {
+            Some(timing) => timing.map_err(|error| Said::of(*error)),
+            None => Err(Said::of(*Diagnostic::error("a variant was not timed"))),
+        },
+    });
+    Ok(Answer::Timed(answers.collect()))
 }

@@ -1,0 +1,148 @@
+//! From rounds of times to a ratio, its interval and the noise floor.
+//!
+//! A round draws the original first and last and the variants between them, so that what disturbs the machine for longer
+//! than a round changes all of its times alike and cancels in their ratios. What disturbs it for less makes outliers,
+//! which a median bears. Disturbances last, so neighbouring rounds are alike: the bootstrap draws blocks of rounds, not
+//! single ones, or its intervals would be too narrow.
+//!
+//! This work is based on: H. R. Künsch, "The jackknife and the bootstrap for general stationary observations", 1989
+//! (blocks).
+
+use lodc_machine::chance::{child, unit};
+
+/// How often the bootstrap draws.
+const RESAMPLES: u64 = 1000;
+/// What is left out at each end of an interval of 99 %.
+const TAIL: f64 = 0.005;
+/// By how much in all the original must get slower, ever more so, to be called throttled.
+const THROTTLED: f64 = 1.1;
+
+/// The times of batches drawn one after the other, all in the same unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Round {
+    /// The original's, as the first and as the last of the round.
+    pub originals: [f64; 2],
+    /// The variants', in the order in which they were given, whatever the order in which they were drawn.
+    pub variants: Vec<f64>,
+}
+
+impl Round {
+    /// The original's time where the round's ratios are taken: the geometric mean, so that a steady drift cancels.
+    fn original(&self) -> f64 {
+        let [first, last] = self.originals;
+        (first * last).sqrt()
+    }
+}
+
+/// A median and its interval of 99 %.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The median.
+    pub median: f64,
+    /// The lower end.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+impl Estimate {
+    /// The median of a series in the order of time, by a block bootstrap. The same always for the same series.
+    pub fn of(series: &[f64]) -> Self {
+        let length = series.len();
+        if length == 0 {
+            return Self {
+                median: f64::NAN,
+                low: f64::NAN,
+                high: f64::NAN,
+            };
+        }
+        // As long as the third root of the series, which grows with it, and slower.
+        let block = (length as f64).cbrt().ceil() as usize;
+        let mut drawn = Vec::with_capacity(length + block);
+        let mut medians: Vec<f64> = (0..RESAMPLES)
+            .map(|resample| {
+                drawn.clear();
+                let seed = child(0, resample);
+                for number in 0.. {
+                    if drawn.len() >= length {
+                        break;
+                    }
+                    // The series is a circle, so that its ends are drawn as often as its middle.
+                    let start = (unit(child(seed, number)) * length as f64) as usize;
+                    drawn.extend((start..start + block).map(|at| series[at % length]));
+                }
+                drawn.truncate(length);
+                middle(&mut drawn)
+            })
+            .collect();
+        medians.sort_by(f64::total_cmp);
+        let left_out = (TAIL * RESAMPLES as f64) as usize;
+        Self {
+            median: median(series),
+            low: medians[left_out],
+            high: medians[medians.len() - 1 - left_out],
+        }
+    }
+
+    /// Half of the interval, as a part of the median.
+    pub fn half_width(&self) -> f64 {
+        (self.high - self.low) / (2.0 * self.median)
+    }
+}
+
+/// The median; NaN of nothing.
+pub fn median(values: &[f64]) -> f64 {
+    middle(&mut values.to_vec())
+}
+
+/// The median of what may be put in another order.
+fn middle(values: &mut [f64]) -> f64 {
+    let length = values.len();
+    if length == 0 {
+        return f64::NAN;
+    }
+    let (below, upper, _) = values.select_nth_unstable_by(length / 2, f64::total_cmp);
+    let upper = *upper;
+    if length % 2 == 1 {
+        return upper;
+    }
+    let lower = below.iter().copied().max_by(f64::total_cmp);
+    lower.map_or(upper, |lower| (lower + upper) / 2.0)
+}
+
+/// How many times as long as the original a variant takes, by its place in the rounds.
+pub fn ratio(rounds: &[Round], variant: usize) -> Estimate {
+    let ratios = rounds.iter().map(|r| r.variants[variant] / r.original());
+    Estimate::of(&ratios.collect::<Vec<_>>())
+}
+
+/// How far the original is from itself: the end of the interval of its last time over its first that is farther from 1.
+pub fn floor(rounds: &[Round]) -> f64 {
+    let [first, last] = [0, 1].map(|at| move |round: &Round| round.originals[at]);
+    let ratios = rounds.iter().map(|round| last(round) / first(round));
+    let own = Estimate::of(&ratios.collect::<Vec<_>>());
+    own.high.max(1.0 / own.low) - 1.0
+}
+
+/// Whether the original's own time drifted from the first third of the rounds to the last by more than the floor.
+pub fn drifts(rounds: &[Round], floor: f64) -> bool {
+    let own: Vec<f64> = rounds.iter().map(Round::original).collect();
+    let third = own.len() / 3;
+    if third < 3 {
+        return false;
+    }
+    let [first, last] = [&own[..third], &own[own.len() - third..]].map(Estimate::of);
+    let widen = 1.0 + floor;
+    last.low > first.high * widen || last.high * widen < first.low
+}
+
+/// Whether the original got slower from each fifth of the rounds to the next, by more than 10 % in all.
+pub fn throttles(rounds: &[Round]) -> bool {
+    let own: Vec<f64> = rounds.iter().map(Round::original).collect();
+    let fifth = own.len() / 5;
+    if fifth < 3 {
+        return false;
+    }
+    let parts: Vec<f64> = own.chunks_exact(fifth).take(5).map(median).collect();
+    parts.is_sorted_by(|a, b| a < b) && parts[4] > THROTTLED * parts[0]
+}
