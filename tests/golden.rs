@@ -12,6 +12,7 @@
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
 //! // facts: fixed material.flags 5                     stated by the scene; a float has a point
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
+//! // facts: texture dust size 64                        texels along each edge; 16 otherwise
 //! // facts: sampler tiled repeats                       along both axes
 //! // facts: texture sky harmonics 1                     smooth: near such a sum, of 0.5, 0.25, 0.125 and so on
 //! ```
@@ -167,6 +168,13 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                     .get_mut(name)
                     .zip(slopes)
                     .map(|(texture, slopes)| texture.slopes = slopes)
+            }
+            ["texture", name, "size", edge] => {
+                let texture = facts.textures.get_mut(name);
+                let edge = edge.parse().ok();
+                texture
+                    .zip(edge)
+                    .map(|(texture, edge)| texture.size = [edge; 2])
             }
             ["sampler", name, "repeats"] => {
                 facts.repeating.insert(name.into());

@@ -29,7 +29,8 @@ pub struct Generated {
     pub bake: Arc<Shader>,
     /// The samples in the bake.
     pub reads: Vec<Read>,
-    /// How many texels each edge has; `None` for as many as the finest of the sources has.
+    /// How many texels each edge has of what has no sources. With sources it has as many as the finest of them, halved until
+    /// the longest edge has no more than this; `None` for no such end.
     pub edge: Option<u32>,
     /// How many numbers of a texel are used, 1 to 4; of fewer than four the last one is 1.
     pub components: usize,

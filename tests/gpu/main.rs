@@ -6,6 +6,7 @@
 #![cfg(all(feature = "gpu", feature = "cli"))]
 
 mod blended;
+mod collapsed;
 #[path = "../fixtures/mod.rs"]
 mod fixtures;
 mod levels;

@@ -13,8 +13,10 @@
 //!   function of them, so that filtering before and after gives the same.
 //! - `levels <root>`: all are at the root, but the value is no linear function, or textures differ in size. Each MIP level is
 //!   computed from that level of the sources: texel for texel it is the same, and what is filtered between texels differs.
-//! - `resampled <root>`: some are at an affine function of the root, by which they repeat along both axes. They are resampled
-//!   into the resolution of the finest of them.
+//! - `resampled <root> <edge>`: some are at an affine function of the root, by which they repeat along both axes. The root is
+//!   where one of them is, or else what all those coordinates are computed of, so that one of its periods is one of theirs
+//!   all. They are resampled into the resolution of the finest of them, halved until the longest edge has no more than so
+//!   many texels: as many as the period has pixels at the facts' distance, or all.
 //!
 //! - `bake <root> <edge>`: the value is computed of texture coordinates and constants alone, without a texture, such as
 //!   noise. Each texel of the finest level is the mean of 4 x 4 points, and there are as many along each edge as the number
@@ -25,7 +27,7 @@
 //!
 //! Declines.
 //! - A texture that the facts do not know, because it may hold anything, and one that has another image in each draw.
-//! - Coordinates without a common period, and coordinates that are used for more than sampling.
+//! - Coordinates without a common period, or with one that would take more than 4096 texels along an edge.
 //! - What is in a branch that may be there for a hole in its domain, and what each round of a loop computes anew.
 //! - Where other users still need all of the samples, so that there would be one more.
 //! - `bake` of little work, of coordinates outside of 0..1, and in branches, where there is no implicit level of detail.
@@ -46,7 +48,7 @@ use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage, ValueId};
 use crate::{Facts, Work};
 use naga::{Expression, SampleLevel};
-use plan::{MOST_EDGE, Plan, is_operation};
+use plan::{MOST_EDGE, MOST_RESAMPLED, Plan, is_operation};
 use seen::{Of, Sample, sample, seen_from};
 
 /// The stage whose samples are collapsed.
@@ -63,7 +65,8 @@ pub struct TextureCollapse;
 enum Kind {
     Same,
     Levels,
-    Resampled,
+    /// With so many texels along the longest edge at most.
+    Resampled(u32),
     /// With so many texels along each edge.
     Bake(u32),
 }
@@ -73,7 +76,7 @@ impl Kind {
         match self {
             Self::Same => "same",
             Self::Levels => "levels",
-            Self::Resampled => "resampled",
+            Self::Resampled(_) => "resampled",
             Self::Bake(_) => "bake",
         }
     }
@@ -81,7 +84,7 @@ impl Kind {
     /// The choice of this kind, with the id of a root.
     fn choice(self, root: &ValueId) -> String {
         match self {
-            Self::Bake(edge) => format!("bake {root} {edge}"),
+            Self::Resampled(edge) | Self::Bake(edge) => format!("{} {root} {edge}", self.word()),
             _ => format!("{} {root}", self.word()),
         }
     }
@@ -92,7 +95,7 @@ impl Kind {
         let kind = match words[..] {
             ["same", root] => Some((Self::Same, root)),
             ["levels", root] => Some((Self::Levels, root)),
-            ["resampled", root] => Some((Self::Resampled, root)),
+            ["resampled", root, edge] => edge.parse().ok().map(|e| (Self::Resampled(e), root)),
             ["bake", root, edge] => edge.parse().ok().map(|edge| (Self::Bake(edge), root)),
             _ => None,
         };
@@ -113,7 +116,7 @@ impl Pass for TextureCollapse {
     fn class(&self, candidate: &Candidate) -> Class {
         match Kind::parse(&candidate.choice) {
             Ok((Kind::Same, _)) => Class::Lossless,
-            Ok((Kind::Levels | Kind::Resampled, _)) => Class::ResolutionLossless,
+            Ok((Kind::Levels | Kind::Resampled(_), _)) => Class::ResolutionLossless,
             Ok((Kind::Bake(_), _)) | Err(_) => Class::Lossy,
         }
     }
@@ -168,43 +171,34 @@ fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
         .iter()
         .filter_map(|value| Some((*value, sample(flow, *value)?)))
         .collect();
-    let mut roots: Vec<Value> = reads.iter().map(|(_, read)| read.coordinate).collect();
-    roots.sort_unstable();
-    roots.dedup();
+    let mut sampled: Vec<Value> = reads.iter().map(|(_, read)| read.coordinate).collect();
+    sampled.sort_unstable();
+    sampled.dedup();
     let mut found: Vec<(Value, Considered)> = Vec::new();
     // For each value, the root that makes texels of it.
     let mut root_of: Vec<Option<Value>> = vec![None; values.len()];
-    for root in roots {
+    let periods = periods(flow, &sampled);
+    for root in sampled.into_iter().chain(periods) {
         let of = seen_from(flow, root);
-        for &site in &values {
-            let is_texels = matches!(of[site.index()], Of::Texels { .. });
-            if is_texels {
-                root_of[site.index()].get_or_insert(root);
-            }
+        let is_texels = |value: Value| matches!(of[value.index()], Of::Texels { .. });
+        let before = root_of.clone();
+        for &value in values.iter().filter(|value| is_texels(**value)) {
+            root_of[value.index()].get_or_insert(root);
         }
+        let is_sampled = reads.iter().any(|(_, read)| read.coordinate == root);
         for site in largest(flow, &of, |of| matches!(of, Of::Texels { .. })) {
-            let plan = Plan::new(flow, (site, root), &of);
-            let considered = match &plan {
-                Ok(plan) => {
-                    let kind = match plan.kind {
-                        // Between the texels of the finer one, the coarser ones have bends.
-                        Kind::Same if !are_as_large(flow, plan, facts) => Kind::Levels,
-                        kind => kind,
-                    };
-                    Some((kind, known(flow, plan, facts)))
-                }
-                // A sample that nothing is done to is not worth a word.
-                Err(_) if sample(flow, site).is_some() => None,
-                Err(why) => Some((Kind::Same, Err(why.clone()))),
-            };
-            if let Some((kind, verdict)) = considered {
-                let id = flow.id(root);
-                let choice = match &verdict {
-                    Ok(()) => kind.choice(id),
-                    Err(_) => kind.word().to_owned(),
-                };
-                found.push((site, candidate(flow, site, choice, verdict.err())));
+            // A larger period is for what has no smaller one.
+            if !is_sampled && before[site.index()].is_some() {
+                continue;
             }
+            let choices = match Plan::new(flow, (site, root), &of) {
+                Ok(plan) => choices(flow, (&plan, root), facts),
+                // A sample that nothing is done to is not worth a word.
+                Err(_) if sample(flow, site).is_some() => Vec::new(),
+                Err(why) => vec![(Kind::Same.word().to_owned(), Some(why))],
+            };
+            let choices = choices.into_iter();
+            found.extend(choices.map(|(choice, why)| (site, candidate(flow, site, choice, why))));
         }
     }
     found.extend(apart(flow, &root_of));
@@ -215,6 +209,120 @@ fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
         .into_iter()
         .map(|(_, considered)| considered)
         .collect()
+}
+
+/// What a plan may be, each as its choice, or why not.
+fn choices(
+    flow: &Flow,
+    (plan, root): (&Plan<'_>, Value),
+    facts: &Facts,
+) -> Vec<(String, Option<Declined>)> {
+    let kinds = known(flow, plan, facts).and_then(|()| match plan.kind {
+        // Between the texels of the finer one, the coarser ones have bends.
+        Kind::Same if !are_as_large(flow, plan, facts) => Ok(vec![Kind::Levels]),
+        Kind::Resampled(_) => resolutions(flow, (plan, root), facts),
+        kind => Ok(vec![kind]),
+    });
+    match kinds {
+        Ok(kinds) => {
+            let kinds = kinds.into_iter();
+            kinds
+                .map(|kind| (kind.choice(flow.id(root)), None))
+                .collect()
+        }
+        Err(why) => vec![(plan.kind.word().to_owned(), Some(why))],
+    }
+}
+
+/// What a resampled texture's longest edge may have at most: a texel for a pixel, where it is known how large the period is
+/// on the screen, and all that its sources have.
+fn resolutions(
+    flow: &Flow,
+    (plan, root): (&Plan<'_>, Value),
+    facts: &Facts,
+) -> Result<Vec<Kind>, Declined> {
+    let whole = plan
+        .textures(flow)
+        .zip(&plan.repeats)
+        .map(|(name, repeats)| {
+            let size = facts
+                .textures
+                .get(name)
+                .map_or([0; 2], |texture| texture.size);
+            let edges = size.iter().zip(repeats);
+            edges.fold(1.0_f32, |most, (edge, times)| {
+                most.max(*edge as f32 * times)
+            })
+        });
+    let whole = whole.fold(1.0, f32::max).ceil() as u32;
+    let fits = pixels_along(flow, root, facts).map_or(whole, |pixels| {
+        let pixels = pixels.clamp(1.0, MOST_RESAMPLED as f32) as u32;
+        pixels.next_power_of_two().max(LEAST_EDGE)
+    });
+    let mut edges: Vec<u32> = [fits.min(whole), whole]
+        .into_iter()
+        .filter(|edge| *edge <= MOST_RESAMPLED)
+        .collect();
+    edges.dedup();
+    match edges.is_empty() {
+        true => Err(Declined(format!(
+            "one period of its coordinates has {whole} texels along an edge, and {MOST_RESAMPLED} is the most"
+        ))),
+        false => Ok(edges.into_iter().map(Kind::Resampled).collect()),
+    }
+}
+
+/// How many pixels the screen has, at the facts' distance, where coordinates go from 0 to 1, when these are an affine
+/// function of texture coordinates of the mesh.
+fn pixels_along(flow: &Flow, root: Value, facts: &Facts) -> Option<f32> {
+    let pixels = facts.pixels_per_coordinate?;
+    inputs(flow).find_map(|input| {
+        let Of::Affine(rows) = &seen_from(flow, input)[root.index()] else {
+            return None;
+        };
+        let [[a, b, _], [c, d, _]] = rows[..] else {
+            return None;
+        };
+        let area = (a * d - b * c).abs();
+        (area > 0.0).then(|| pixels / area.sqrt())
+    })
+}
+
+/// What may be texture coordinates of the mesh.
+fn inputs<'f>(flow: &'f Flow<'_>) -> impl Iterator<Item = Value> + 'f {
+    let values = flow.function.expressions.iter().map(|(value, _)| value);
+    values.filter(|v| flow.input(*v).is_some() && flow.floats(*v) == Some(2))
+}
+
+/// Two floats that nobody samples at, which coordinates are computed of by arithmetic: where these have a common period, it
+/// is one of those.
+fn periods(flow: &Flow, sampled: &[Value]) -> Vec<Value> {
+    let mut found = Vec::new();
+    let mut seen = vec![false; flow.function.expressions.len()];
+    let mut left: Vec<Value> = sampled.to_vec();
+    while let Some(value) = left.pop() {
+        if std::mem::replace(&mut seen[value.index()], true) {
+            continue;
+        }
+        let expression = &flow.function.expressions[value];
+        let is_computed = matches!(
+            expression,
+            Expression::Binary { .. }
+                | Expression::Unary { .. }
+                | Expression::Compose { .. }
+                | Expression::Splat { .. }
+                | Expression::Swizzle { .. }
+        );
+        let is_part = matches!(expression, Expression::AccessIndex { .. });
+        if flow.floats(value) == Some(2) && !is_computed {
+            found.push(value);
+        } else if is_computed || (is_part && flow.floats(value) == Some(1)) {
+            operands::each(expression, |operand| left.push(operand));
+        }
+    }
+    found.retain(|value| !sampled.contains(value));
+    found.sort_unstable();
+    found
 }
 
 fn candidate(flow: &Flow, site: Value, choice: String, declined: Option<Declined>) -> Considered {
@@ -291,7 +399,7 @@ fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
         let why = "a level of detail that is given means another size in each of its textures";
         return Err(Declined(why.into()));
     }
-    if plan.kind == Kind::Resampled {
+    if let Kind::Resampled(_) = plan.kind {
         let sampler = plan
             .samples
             .first()
@@ -346,7 +454,7 @@ fn apart(flow: &Flow, root_of: &[Option<Value>]) -> Vec<(Value, Considered)> {
                 let declined = Some(Declined(why.into()));
                 (
                     value,
-                    candidate(flow, value, Kind::Resampled.word().into(), declined),
+                    candidate(flow, value, Kind::Resampled(0).word().into(), declined),
                 )
             })
         })
@@ -360,10 +468,8 @@ fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
         return Vec::new();
     };
     let works: Vec<Work> = cost::of_expressions(flow.module, &flow.function.expressions, &types);
-    let values = flow.function.expressions.iter().map(|(value, _)| value);
-    let roots = values.filter(|v| flow.input(*v).is_some() && flow.floats(*v) == Some(2));
     let mut found = Vec::new();
-    for root in roots {
+    for root in inputs(flow) {
         let of = seen_from(flow, root);
         for site in largest(flow, &of, |of| *of == Of::Function) {
             let edge = facts.pixels_per_coordinate.map_or(LEAST_EDGE, |pixels| {
@@ -371,11 +477,11 @@ fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
                 pixels.next_power_of_two().clamp(LEAST_EDGE, MOST_EDGE)
             });
             let plan = Plan::procedural(flow, (site, root), &of, edge);
-            if plan
-                .as_ref()
-                .is_ok_and(|plan| plan.work(&works) < SAMPLE_WEIGHT)
-                || !is_operation(flow, site)
-            {
+            let is_worth_it = match &plan {
+                Ok(plan) => plan.work(&works) >= SAMPLE_WEIGHT,
+                Err(_) => is_operation(flow, site),
+            };
+            if !is_worth_it {
                 continue;
             }
             match plan.and_then(|plan| may_be_baked(flow, (&plan, root), facts)) {
@@ -393,7 +499,7 @@ fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
     found
 }
 
-/// The shortest edge of a texture of a value without one, in texels; half of it is tried too.
+/// The shortest edge of a texture whose resolution is chosen, in texels. Half of it is tried too of a value without a texture.
 const LEAST_EDGE: u32 = 16;
 
 /// How far beyond 0..1 coordinates may go, as interpolation rounds them.

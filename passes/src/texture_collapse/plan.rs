@@ -25,6 +25,9 @@ const BAKE: &str = "bake";
 /// The longest edge of the texture of a value without one, in texels.
 pub(super) const MOST_EDGE: u32 = 1024;
 
+/// The longest edge of a texture that others are resampled into, in texels.
+pub(super) const MOST_RESAMPLED: u32 = 4096;
+
 /// A collapse that can be made.
 pub(super) struct Plan<'a> {
     site: Value,
@@ -36,7 +39,7 @@ pub(super) struct Plan<'a> {
     /// The sample that reads the new texture; `None` where there is none, and a new one does.
     carrier: Option<Value>,
     /// For each sample, how often its texture repeats.
-    repeats: Vec<[f32; 2]>,
+    pub(super) repeats: Vec<[f32; 2]>,
 }
 
 impl<'a> Plan<'a> {
@@ -55,6 +58,12 @@ impl<'a> Plan<'a> {
         match (kind, plan.kind) {
             // Textures that differ in size: it does the same, and promises less.
             (Kind::Levels, Kind::Same) => Ok(Self { kind, ..plan }),
+            (Kind::Resampled(edge), Kind::Resampled(_)) => {
+                match (1..=MOST_RESAMPLED).contains(&edge) {
+                    true => Ok(Self { kind, ..plan }),
+                    false => Err(Declined("no texture has such an edge".into())),
+                }
+            }
             _ if plan.kind == kind => Ok(plan),
             _ => Err(Declined(format!("it could be `{}`", plan.kind.word()))),
         }
@@ -133,7 +142,7 @@ impl<'a> Plan<'a> {
             kind: match (at_root, linear) {
                 (true, true) => Kind::Same,
                 (true, false) => Kind::Levels,
-                (false, _) => Kind::Resampled,
+                (false, _) => Kind::Resampled(MOST_RESAMPLED),
             },
             carrier: Some(*carrier),
             repeats: all_repeats,
@@ -221,8 +230,8 @@ impl<'a> Plan<'a> {
             bake: Arc::new(self.bake(flow, components)),
             reads: self.reads(flow),
             edge: match self.kind {
-                Kind::Bake(edge) => Some(edge),
-                _ => None,
+                Kind::Bake(edge) | Kind::Resampled(edge) => Some(edge),
+                Kind::Same | Kind::Levels => None,
             },
             components,
         };

@@ -240,7 +240,7 @@ impl Bake {
     fn run(&self, bindings: &Bindings, store: &Store) -> Baked {
         let mut own = bindings.clone();
         self.textures.bind(&mut own, store);
-        if let Some(edge) = self.edge {
+        if let (Some(edge), true) = (self.edge, self.reads.is_empty()) {
             return self.rounded(self.filtered(edge.max(1), &own));
         }
         let sources = self.sources(&own);
@@ -255,7 +255,8 @@ impl Bake {
             levels = levels.max(texture.level_count());
         }
         // Halved, so that the texels of the sources still fall together.
-        while size.iter().any(|edge| *edge > MAX_EDGE as f32) {
+        let most = self.edge.unwrap_or(MAX_EDGE).clamp(1, MAX_EDGE) as f32;
+        while size.iter().any(|edge| *edge > most) {
             size = size.map(|edge| edge / 2.0);
         }
         let size = size.map(|edge| (edge.round() as u32).max(1));
