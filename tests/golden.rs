@@ -14,6 +14,7 @@
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
 //! // facts: texture dust size 64                        texels along each edge; 16 otherwise
 //! // facts: sampler tiled repeats                       along both axes
+//! // in turn: fs_main.diffuse_3 fs_main.specular_3     only what the first candidates of these make, one after the other
 //! // facts: texture sky harmonics 1                     smooth: near such a sum, of 0.5, 0.25, 0.125 and so on
 //! ```
 //!
@@ -89,6 +90,8 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
     let facts = facts(&shader, &text).unwrap_or_else(|line| fail(&format!("cannot read `{line}`")));
     let all = ["vertex-motion", "to-parameter", "texture-collapse"].contains(&pass.name());
     let stages = |variant: &Shader, all| stages((&source, &shader), variant, all);
+    let mut lines = text.lines();
+    let in_turn = lines.find_map(|line| line.strip_prefix("// in turn: "));
     let mut golden = String::new();
     let mut offered = 0;
     for considered in pass.consider(&shader, &facts) {
@@ -108,6 +111,22 @@ fn golden(pass: &dyn Pass, path: &Path) -> (String, usize) {
         let before = stages(&shader, all);
         let after = stages(&pass.apply(&shader, &candidate), all);
         assert_ne!(before, after, "{name}: {candidate} changes nothing");
+        golden.push_str(&fixtures::whole_diff(&before, &after));
+        golden.push('\n');
+    }
+    if let Some(sites) = in_turn {
+        golden.clear();
+        let mut variant = shader.clone();
+        let mut made = Vec::new();
+        for site in sites.split(' ') {
+            let mut all = pass.candidates(&variant, &facts).into_iter();
+            let first = all.find(|candidate| candidate.site.path() == site);
+            let candidate = first.unwrap_or_else(|| fail(&format!("`{site}` is not offered then")));
+            variant = pass.apply(&variant, &candidate);
+            made.push(candidate.to_string());
+        }
+        let _ = writeln!(golden, "# {}", made.join(", then "));
+        let [before, after] = [&shader, &variant].map(|shader| stages(shader, all));
         golden.push_str(&fixtures::whole_diff(&before, &after));
         golden.push('\n');
     }

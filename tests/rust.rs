@@ -6,13 +6,16 @@
 
 mod moved;
 
+use lodc::compile::normal_form;
 use lodc::eval::machine::{Bindings, Resource};
 use lodc::eval::parameters::ParameterStage;
-use lodc_passes::Shader;
+use lodc::front::Source;
+use lodc_passes::to_parameter::ToParameter;
+use lodc_passes::{Facts, Pass, Shader};
 use moved::{Chance, apart, bytes, of_words};
 use naga::TypeInner;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// As a host has it: in a module of its own.
@@ -25,12 +28,20 @@ mod integers {
 mod lights {
     include!("../testdata/parameters/lights.lod.rs");
 }
+mod loops {
+    include!("../testdata/parameters/loops.lod.rs");
+}
 mod matrices {
     include!("../testdata/parameters/matrices.lod.rs");
 }
 
 /// Uniforms that each fixture is run with.
 const RUNS: usize = 4000;
+
+fn path(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/parameters");
+    folder.join(name).with_extension("wgsl")
+}
 
 /// A fixture, and what the evaluator makes of its parameters.
 struct Fixture {
@@ -40,14 +51,22 @@ struct Fixture {
 
 impl Fixture {
     fn new(name: &str) -> Self {
-        let path = format!(
-            "{}/testdata/parameters/{name}.wgsl",
-            env!("CARGO_MANIFEST_DIR")
-        );
-        let (shader, _) = moved::with_parameters(Path::new(&path));
+        Self::of(moved::with_parameters(&path(name)).0)
+    }
+
+    fn of(shader: Shader) -> Self {
         let stage = ParameterStage::of(&shader).unwrap_or_else(|r| panic!("{}", r.what));
         let stage = stage.expect("it has parameters");
         Self { shader, stage }
+    }
+
+    /// What the evaluator fills the block with.
+    fn block(&self, buffers: &[&[u32]]) -> Vec<u8> {
+        let mut bindings = Bindings::default();
+        for (at, words) in (0..).zip(buffers) {
+            bindings.insert((0, at), Resource::Buffer(Arc::new(bytes(words))));
+        }
+        self.stage.blocks(&bindings, 1).0.swap_remove(0)
     }
 
     /// Holds parameters against the evaluator's for buffers with these words, at bindings from 0 on. `within` says how many
@@ -60,11 +79,7 @@ impl Fixture {
         within: impl Fn(&str, f32) -> Option<u32>,
     ) -> BTreeMap<String, u32> {
         let mut seen: BTreeMap<String, u32> = BTreeMap::new();
-        let mut bindings = Bindings::default();
-        for (at, words) in (0..).zip(buffers) {
-            bindings.insert((0, at), Resource::Buffer(Arc::new(bytes(words))));
-        }
-        let (blocks, _) = self.stage.blocks(&bindings, 1);
+        let block = self.block(buffers);
         for member in self.shader.parameters() {
             let name = member.name.as_deref().unwrap_or_default();
             let (count, is_float) = match self.shader.module().types[member.ty].inner {
@@ -79,7 +94,7 @@ impl Fixture {
                 let word = |bytes: &[u8]| {
                     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
                 };
-                let [found, wanted] = [found, &blocks[0]].map(word);
+                let [found, wanted] = [found, &block].map(word);
                 let [a, b] = [found, wanted].map(f32::from_bits);
                 let far = match is_float {
                     true => apart(found, wanted),
@@ -114,6 +129,45 @@ fn a_sum_over_lights_is_the_evaluators() {
         let found = lights::lod_parameters(&of_words(&camera), &of_words(&lights));
         fixture.hold(&[&camera, &lights], &found.to_bytes(), exact);
     }
+}
+
+#[test]
+fn sums_of_loops_that_were_joined_are_what_each_is_alone() {
+    let fixture = Fixture::new("loops");
+    let source = Source::read(&path("loops")).unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+    let alone = ToParameter.candidates(&base, &Facts::default());
+    let alone: Vec<Fixture> = alone
+        .iter()
+        .map(|candidate| Fixture::of(ToParameter.apply(&base, candidate)))
+        .collect();
+    let mut chance = Chance(5);
+    let mut held = 0;
+    for _ in 0..RUNS {
+        let given = chance.words(&format!("{}iiif", "f".repeat(32)));
+        let found = loops::lod_parameters(&of_words(&given));
+        fixture.hold(&[&given], &found.to_bytes(), exact);
+        let joined = fixture.block(&[&given]);
+        for one in &alone {
+            let block = one.block(&[&given]);
+            for member in one.shader.parameters() {
+                let mut others = fixture.shader.parameters().iter();
+                let other = others.find(|other| other.name == member.name);
+                let other = other.expect("all are moved").offset as usize;
+                let ty = &one.shader.module().types[member.ty].inner;
+                let size = ty.size(one.shader.module().to_ctx()) as usize;
+                let at = member.offset as usize;
+                assert_eq!(
+                    block[at..at + size],
+                    joined[other..other + size],
+                    "{:?}\n{given:x?}",
+                    member.name
+                );
+                held += 1;
+            }
+        }
+    }
+    assert_eq!(held, 8 * RUNS);
 }
 
 #[test]

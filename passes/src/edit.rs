@@ -70,6 +70,8 @@ pub struct Edit<'a> {
     parameters: Vec<(String, Handle<Type>, Handle<Expression>)>,
     /// The textures that it reads beside those that it read.
     generated: Vec<Generated>,
+    /// What is done in the place of what was.
+    body: Option<Block>,
     /// What is done before it returns.
     before_return: Block,
     branches: Vec<Branch>,
@@ -100,6 +102,7 @@ impl<'a> Edit<'a> {
             outputs: Vec::new(),
             parameters: Vec::new(),
             generated: Vec::new(),
+            body: None,
             before_return: Block::new(),
             branches: Vec::new(),
             expressions: function.expressions.clone(),
@@ -194,6 +197,11 @@ impl<'a> Edit<'a> {
     /// added ones, in one `Emit` each.
     pub(crate) fn do_before_return(&mut self, mut statements: Block) {
         self.before_return.append(&mut statements);
+    }
+
+    /// Has other statements done than were. Old values are computed in one `Emit` each, and added ones where they are used.
+    pub(crate) fn put_body(&mut self, body: Block) {
+        self.body = Some(body);
     }
 
     /// From now on an old value, a scalar or a vector, is what a branch leaves: the first side where the condition holds, the
@@ -357,7 +365,10 @@ impl<'a> Edit<'a> {
     /// beforehand.
     pub fn finish(mut self) -> Shader {
         let base_body = &self.shader.module.entry_points[self.entry].function.body;
-        let mut body = Cow::Borrowed(base_body);
+        let mut body = match self.body.take() {
+            Some(body) => Cow::Owned(body),
+            None => Cow::Borrowed(base_body),
+        };
         for ((user, value), new) in &self.replaced_for {
             match *user {
                 User::Value(user) => {

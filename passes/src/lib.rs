@@ -20,6 +20,7 @@ pub mod gradients;
 mod interface;
 pub mod least_squares;
 mod live;
+mod lockstep;
 pub mod normalize;
 pub mod op_removal;
 pub mod operands;

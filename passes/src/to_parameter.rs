@@ -5,8 +5,8 @@
 //! them, of the fragment stage, that what varies within the draw is in, too.
 //!
 //! Effect. All that computes the value is copied to the parameter stage, which stores it in the block (see
-//! [`crate::parameters`]); the users of the site read it there. What several moved values share is computed once. Loops are
-//! copied with the variables that they work on.
+//! [`crate::parameters`]); the users of the site read it there. Loops and branches are copied with the variables that they
+//! work on. What several moved values share is computed once, a loop that they need as well (see [`crate::lockstep`]).
 //! - `exact`: nothing but uniforms and constants is in it. The largest such values are offered, as far as they do some work.
 //! - `average <ids>`: the largest values in it that no uniform is in become constants, which the candidate carries, at
 //!   first their means over the samples; a search finds better ones. Uniforms stay what they are, so that the level follows
@@ -39,7 +39,7 @@ use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
 use crate::slice::{Around, Slice, Source};
 use crate::specialize::place::Place;
-use crate::{Facts, Work, constants, cost, operands};
+use crate::{Facts, Work, constants, cost, lockstep, operands};
 use naga::{BinaryOperator, Expression, Handle, Literal, Scalar, ScalarKind, Statement, TypeInner};
 use std::collections::BTreeMap;
 
@@ -620,7 +620,7 @@ impl<'a> Study<'a> {
         let ty = held(flow.inner(site)).expect("a planned value is held");
         let ty = edit.ty(ty);
         edit.add_parameter(name.clone(), ty, value);
-        let filled = edit.finish();
+        let filled = lockstep::joined(edit.finish(), Stage::Parameter);
 
         let block = filled.parameter_block().expect("it was just stored");
         let index = filled.parameters().len() as u32 - 1;

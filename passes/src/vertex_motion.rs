@@ -4,9 +4,10 @@
 //! textures and constants; the vertex stage is the user's own, hands those inputs over, and there is room for another.
 //!
 //! Effect. All that computes the value is copied to the end of the vertex stage, which hands the value over as another
-//! output; the users of the site use that input. What several moved values share is computed once, but for loops: each
-//! value brings those that it needs, with the variables that they work on. A texture is read with an explicit level there, which the candidate carries for each
-//! read whose level was implicit: at first the level that the distance leads to; a search finds better ones.
+//! output; the users of the site use that input. Loops and branches are copied with the variables that they work on. What
+//! several moved values share is computed once, a loop that they need as well (see [`crate::lockstep`]). A texture is read
+//! with an explicit level there, which the candidate carries for each read whose level was implicit: at first the level
+//! that the distance leads to; a search finds better ones.
 //! - `flat`: it is the same for a whole triangle, and is handed over as it is.
 //! - `affine`: it is an affine function of what is interpolated, so that it may be interpolated itself.
 //! - `interpolate`: it is something else.
@@ -41,7 +42,7 @@ use crate::rate::{Rate, Rates, Surface};
 use crate::recipe::{Candidate, Class, Considered, Declined, Pass};
 use crate::shader::{Shader, Stage};
 use crate::slice::{Around, Slice, Source};
-use crate::{Facts, Work, operands};
+use crate::{Facts, Work, lockstep, operands};
 use naga::{
     BinaryOperator as Op, Binding, Expression, FunctionArgument, Handle, ImageClass, Interpolation,
     Literal, MathFunction as Math, SampleLevel, Statement, Type, TypeInner, UnaryOperator,
@@ -616,7 +617,7 @@ impl<'a> Study<'a> {
             binding: binding.clone(),
         };
         edit.add_output(output, value);
-        let with_output = edit.finish();
+        let with_output = lockstep::joined(edit.finish(), Stage::Vertex);
 
         let mut edit = Edit::new(&with_output, Stage::Fragment);
         let argument = FunctionArgument {

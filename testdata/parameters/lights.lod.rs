@@ -78,10 +78,8 @@ pub fn lod_parameters(camera: &Camera, lights: &Lights) -> LodParameters {
 #[allow(clippy::all, clippy::pedantic, non_snake_case, unreachable_code, unused_assignments, unused_labels, unused_mut, unreachable_pub)]
 fn lod_one_parameters(camera: &Camera, lights: &Lights, parameters_stored: &mut LodParameters) {
     let mut hits: u32 = 0u32;
-    let mut hits_2: u32 = 0u32;
     let mut radiance: [f32; 3] = [0.0; 3];
     let mut i: u32 = 0u32;
-    let mut i_2: u32 = 0u32;
     let mut local: bool = false;
     radiance = lights.ambient;
     'rounds_1: loop {
@@ -95,8 +93,8 @@ fn lod_one_parameters(camera: &Camera, lights: &Lights, parameters_stored: &mut 
             if at_range * at_range < squared {
                 break 'round_2;
             }
-            let hits_3 = hits.wrapping_add(1u32);
-            hits = hits_3;
+            let hits_2 = hits.wrapping_add(1u32);
+            hits = hits_2;
             let at_kind = lights.all[wgsl::at(i, 40)].kind;
             'switch_3: {
                 match at_kind {
@@ -115,43 +113,13 @@ fn lod_one_parameters(camera: &Camera, lights: &Lights, parameters_stored: &mut 
                     }
                 }
             }
-            if hits_3 == 7u32 {
+            if hits_2 == 7u32 {
                 break 'rounds_1;
             }
         }
         i = i.wrapping_add(1u32);
     }
-    'rounds_4: loop {
-        'round_5: {
-            if !(i_2 < lights.count.min(40u32)) {
-                break 'rounds_4;
-            }
-            let away_2 = wgsl::subtract_3(lights.all[wgsl::at(i_2, 40)].position, camera.eye);
-            let squared_2 = wgsl::dot_3(away_2, away_2);
-            let at_range_2 = lights.all[wgsl::at(i_2, 40)].range;
-            if at_range_2 * at_range_2 < squared_2 {
-                break 'round_5;
-            }
-            let hits_4 = hits_2.wrapping_add(1u32);
-            hits_2 = hits_4;
-            'switch_6: {
-                match lights.all[wgsl::at(i_2, 40)].kind {
-                    0 => {}
-                    1 | 2 => {
-                        if at_range_2 < 0.5 {
-                            break 'switch_6;
-                        }
-                    }
-                    _ => {}
-                }
-            }
-            if hits_4 == 7u32 {
-                break 'rounds_4;
-            }
-        }
-        i_2 = i_2.wrapping_add(1u32);
-    }
-    parameters_stored.return_div = (hits_2 as f32) / 8.0;
+    parameters_stored.return_div = (hits as f32) / 8.0;
     parameters_stored.towards = wgsl::normalize_3(wgsl::subtract_3(camera.eye, lights.ambient));
     let value = radiance;
     let value_2 = radiance;

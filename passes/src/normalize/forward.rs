@@ -440,17 +440,7 @@ impl Forward<'_> {
                 } => !access.contains(StorageAccess::STORE),
                 _ => true,
             },
-            Expression::CallResult(_)
-            | Expression::AtomicResult { .. }
-            | Expression::WorkGroupUniformLoadResult { .. }
-            | Expression::RayQueryProceedResult
-            | Expression::RayQueryGetIntersection { .. }
-            | Expression::RayQueryVertexPositions { .. }
-            | Expression::SubgroupBallotResult
-            | Expression::SubgroupOperationResult { .. }
-            | Expression::CooperativeLoad { .. }
-            | Expression::CooperativeMultiplyAdd { .. } => false,
-            _ => true,
+            ref other => is_function(other),
         }
     }
 
@@ -2061,8 +2051,25 @@ fn inner_of(shape: Shape) -> TypeInner {
     }
 }
 
+/// Whether an expression is a function of its operands and of what they lead to, not what a statement gave.
+pub(crate) fn is_function(expression: &Expression) -> bool {
+    !matches!(
+        expression,
+        Expression::CallResult(_)
+            | Expression::AtomicResult { .. }
+            | Expression::WorkGroupUniformLoadResult { .. }
+            | Expression::RayQueryProceedResult
+            | Expression::RayQueryGetIntersection { .. }
+            | Expression::RayQueryVertexPositions { .. }
+            | Expression::SubgroupBallotResult
+            | Expression::SubgroupOperationResult { .. }
+            | Expression::CooperativeLoad { .. }
+            | Expression::CooperativeMultiplyAdd { .. }
+    )
+}
+
 /// Whether two expressions are the same to the bit.
-fn same(a: &Expression, b: &Expression) -> bool {
+pub(crate) fn same(a: &Expression, b: &Expression) -> bool {
     match (a, b) {
         // Zeros of both signs are equal, but not the same.
         (Expression::Literal(Literal::F64(a)), Expression::Literal(Literal::F64(b))) => {
