@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         scene: &scene,
     };
     let wanted = (Scope::None, &Kept::default());
-    let found = find(&stand, wanted, &|_| {}).map_err(|refused| refused.what.clone())?;
+    let found = find(&stand, wanted, None, &|_| {}).map_err(|refused| refused.what.clone())?;
     let level = level.parse().ok().and_then(|i: usize| found.levels.get(i));
     let level = level.ok_or("there is no such level")?;
     let frame = scene.frames(level.distance).swap_remove(0);

@@ -4,19 +4,32 @@
 //!
 //! ```sh
 //! cargo run --release --example table1 -- testdata/materials/leather.wgsl
+//! cargo run --release --example table1 -- testdata/materials/leather.wgsl --time target/release/lodc
 //! ```
+//!
+//! With `--time` and the file of lodc itself, which draws in a process of its own, it has the measured speed-up beside them: the
+//! original's time at the same distance by the level's, on the best adapter.
 
-use lodc::compile::{self, Request};
+use lodc::compile::{self, Measuring, Request, RunTime};
+use lodc::time::clock::worst_ratio;
 use lodc_passes::goal::{Goal, Resource};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let Some(shader) = arguments.next() else {
-        eprintln!("usage: table1 SHADER [GOAL] [PASS...]");
+        eprintln!("usage: table1 SHADER [GOAL] [PASS...] [--time LODC]");
         std::process::exit(2);
     };
     let (mut goal, mut only) = (Goal::only(Resource::Accesses), Vec::new());
-    for argument in arguments {
+    let mut time = RunTime::Estimated;
+    while let Some(argument) = arguments.next() {
+        if argument == "--time" {
+            time = RunTime::Measured(Measuring {
+                program: arguments.next().unwrap_or_default().into(),
+                ..Measuring::default()
+            });
+            continue;
+        }
         match argument.parse() {
             Ok(named) => goal = named,
             Err(_) => only.push(argument),
@@ -26,6 +39,7 @@ fn main() {
         shader: shader.into(),
         goal: Some(goal),
         only,
+        time,
         ..Request::default()
     };
     if let Err(error) = print(&request) {
@@ -41,36 +55,43 @@ fn print(request: &Request) -> lodc::Result<()> {
     }
     let report = &compiled.report;
     let whole = report.levels[0].cost.texture_samples;
-    println!("  level  autoLOD  active  accesses  reduction  cost");
+    println!("  level  autoLOD  active  accesses  reduction  cost  speed-up");
     for (number, level) in report.levels.iter().enumerate() {
         let accesses = level.cost.texture_samples;
         println!(
-            "  {number:<5}  {:7.2}  {:6}  {accesses:8.1}  {:>9}  {:4.2}",
+            "  {number:<5}  {:7.2}  {:6}  {accesses:8.1}  {:>9}  {:4.2}  {:>8}",
             level.autolod,
             level.cost.active_textures,
             reduction(accesses, whole),
-            level.time.ratio,
+            level.cost.estimated_time,
+            speed_up(Some(level.time.ratio).filter(|_| level.time.kind == "measured")),
         );
     }
     let steps = compile::trajectory(request)?;
     let whole = steps[0].used.work;
-    println!("\n  step   excess   bound  active  accesses  reduction  cost  removed");
+    println!("\n  step   excess   bound  active  accesses  reduction  cost  speed-up  removed");
     for (number, step) in steps.iter().enumerate() {
         let work = step.used.work;
         let removed = step.recipe.0.last();
         let line = format!(
-            "  {number:<5}  {:6.3}  {:>6}  {:6}  {:8.1}  {:>9}  {:4.2}  {}",
+            "  {number:<5}  {:6.3}  {:>6}  {:6}  {:8.1}  {:>9}  {:4.2}  {:>8}  {}",
             step.excess,
             if step.strain <= 1.0 { "within" } else { "over" },
             step.used.textures,
             work.samples,
             reduction(work.samples, whole.samples),
             work.total() / whole.total(),
+            speed_up(worst_ratio(&step.timed)),
             removed.map_or("", |step| step.site.path()),
         );
         println!("{}", line.trim_end());
     }
     Ok(())
+}
+
+/// How many times as fast as the original it was.
+fn speed_up(ratio: Option<f64>) -> String {
+    ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{:.2}", 1.0 / ratio))
 }
 
 /// The share of the accesses that is gone.

@@ -4,6 +4,8 @@
 //! [`crate::emit::write_atomically`].
 
 #[cfg(feature = "search")]
+mod clock;
+#[cfg(feature = "search")]
 mod compare;
 #[cfg(feature = "search")]
 mod directives;
@@ -19,6 +21,8 @@ mod textures;
 mod transition;
 
 pub use crate::emit::Files;
+#[cfg(feature = "search")]
+pub use clock::Timings;
 #[cfg(feature = "search")]
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
@@ -37,6 +41,43 @@ use std::path::{Path, PathBuf};
 /// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
 /// The largest shader that was seen has 15,537.
 pub const EXPRESSION_LIMIT: usize = 100_000;
+
+/// Where run times come from.
+#[cfg(feature = "search")]
+#[derive(Clone, Debug, Default)]
+pub enum RunTime {
+    /// From the cost model: shares of the original's.
+    #[default]
+    Estimated,
+    /// From a device.
+    Measured(Measuring),
+    /// From recordings of devices, which stand in for them.
+    Recorded(Recorded),
+}
+
+/// How variants are timed on a device.
+#[cfg(feature = "search")]
+#[derive(Clone, Debug, Default)]
+pub struct Measuring {
+    /// The file of lodc, which draws in a process of its own.
+    pub program: PathBuf,
+    /// A part of the adapter's name; the best one by default.
+    pub adapter: Option<String>,
+    /// The folder in which timings are kept from run to run.
+    pub cache: Option<PathBuf>,
+    /// The file that a recording of all timings goes to.
+    pub record: Option<PathBuf>,
+    /// How much time a timing may take, and how exact it is to be.
+    pub effort: crate::time::Effort,
+}
+
+/// Recordings, one for each adapter.
+#[cfg(feature = "search")]
+#[derive(Clone, Debug, Default)]
+pub struct Recorded {
+    /// Their files, as `--record` writes them.
+    pub files: Vec<PathBuf>,
+}
 
 /// What is compiled, and where it goes.
 #[derive(Clone, Debug, Default)]
@@ -77,6 +118,9 @@ pub struct Request {
     /// Which shaders are made exact first.
     #[cfg(feature = "search")]
     pub exact: crate::search::Scope,
+    /// Where run times come from.
+    #[cfg(feature = "search")]
+    pub time: RunTime,
     /// What is never folded, simplified or left out: uniforms, textures, values, functions.
     pub keep: Vec<String>,
     /// The command that reproduces the result, for the report.

@@ -291,6 +291,7 @@ fn a_level_with_values_at_the_vertices_is_drawn_as_its_variant() {
         distance: scene.distances[1],
         error: 0.0,
         cost: 1.0,
+        time: None,
         says: "values per vertex".into(),
     };
     for form in [Form::Override, Form::Uniform, Form::Files] {

@@ -77,6 +77,7 @@ fn the_example_of_the_paper_becomes_one_constant_in_his_steps() {
             distance: 1.0,
             error: 0.0,
             cost: 1.0,
+            time: None,
             says: "a step".into(),
         };
         let files = Output {

@@ -391,6 +391,7 @@ fn through(path: &Path, stages: &mut usize) -> Result<()> {
         distance: scene.nearest,
         error: 0.0,
         cost: 1.0,
+        time: None,
         says: "some edits".to_owned(),
     };
     let files = emit::emit(&source, &base, &[level], Output::default())?;

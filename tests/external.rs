@@ -163,6 +163,7 @@ fn levels(base: &Shader, moves: bool) -> Vec<EmitLevel> {
             distance: 2.0,
             error: 0.01,
             cost: 0.5,
+            time: None,
             says: format!("{count} changes"),
         })
         .collect()

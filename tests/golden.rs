@@ -144,6 +144,7 @@ fn stages((source, base): (&Source, &Shader), shader: &Shader, all: bool) -> Str
         distance: 1.0,
         error: 0.0,
         cost: 1.0,
+        time: None,
         says: "a variant".into(),
     };
     let output = Output {

@@ -42,6 +42,7 @@ fn golden(path: &Path) -> String {
         distance: 1.0,
         error: 0.0,
         cost: 1.0,
+        time: None,
         says: "the normal form".into(),
     };
     let output = Output {

@@ -109,6 +109,12 @@ impl Goal {
         all.filter(|(_, weight)| *weight > 0.0)
     }
 
+    /// How much of the whole the time weighs, 0..=1.
+    pub fn weight_of_time(&self) -> f64 {
+        let [time, ..] = self.weights;
+        time / self.weights.iter().sum::<f64>()
+    }
+
     /// The cost of a variant: the weighted mean of what it uses up, each as a share of the original's, in units of the
     /// original's time. What the original uses nothing of does not count. For the time alone that is
     /// [`Work::total`], to the last bit.

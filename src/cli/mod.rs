@@ -4,10 +4,14 @@
 mod child;
 mod progress;
 
-use crate::compile::{self, CompareRequest, DrawnBy, InitRequest, Request, SnapshotRequest};
+use crate::compile::{
+    self, CompareRequest, DrawnBy, InitRequest, Measuring, Recorded, Request, RunTime,
+    SnapshotRequest,
+};
 use crate::emit::{self, Form, Target, Transition};
 use crate::front::{Definition, Modules, Stages};
 use crate::search::Scope;
+use crate::time::Effort;
 use crate::{Diagnostic, Result, report};
 use clap::{Args, Parser, Subcommand};
 use lodc_passes::Goal;
@@ -17,6 +21,7 @@ use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Makes cheaper versions of a material shader for the distances at which nobody sees the difference
 #[derive(Debug, Parser)]
@@ -248,12 +253,126 @@ struct CompileArgs {
     /// How much memory the textures that are made for a level may take together, with their MIP levels
     #[arg(long, value_name = "MIB")]
     max_texture_memory: Option<u32>,
+    #[command(flatten)]
+    time: TimeArgs,
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
     /// Prints nothing but errors
     #[arg(short, long)]
     quiet: bool,
+}
+
+/// Where run times come from.
+#[derive(Debug, Args)]
+struct TimeArgs {
+    /// Where run times come from, by which levels are chosen [default: estimated]
+    #[arg(long, value_enum)]
+    time: Option<TimeWord>,
+    /// The GPU that variants are timed on: words of its name [default: the best]
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// How long the timing of a variant may take; it ends sooner when it is exact to 1 % [default: 2]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_budget: Option<Duration>,
+    /// Times everything anew, and keeps nothing
+    #[arg(long)]
+    no_cache: bool,
+    /// Writes all timings to a file, which stands in for the adapter with --recordings
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Takes times from files that --record has written, instead of an adapter; of several, for the adapter where a level does
+    /// worst
+    #[arg(long, value_name = "FILES", num_args = 1.., conflicts_with_all = ["time_budget", "no_cache", "record"])]
+    recordings: Vec<PathBuf>,
+}
+
+/// Where run times come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum TimeWord {
+    /// From the cost model
+    Estimated,
+    /// From draws on a GPU
+    Measured,
+}
+
+/// The variable that names the folder of what is kept from run to run.
+const CACHE: &str = "LODC_CACHE";
+
+/// The folder of what is kept from run to run: `LODC_CACHE`, else lodc's folder where the system keeps such things.
+fn cache_folder() -> Option<PathBuf> {
+    let of_variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+    if let Some(folder) = of_variable(CACHE) {
+        return Some(folder.into());
+    }
+    let home = std::env::home_dir();
+    let folder = match std::env::consts::OS {
+        "windows" => of_variable("LOCALAPPDATA").map(PathBuf::from),
+        "macos" => home.map(|home| home.join("Library").join("Caches")),
+        _ => of_variable("XDG_CACHE_HOME")
+            .map(PathBuf::from)
+            .or_else(|| home.map(|home| home.join(".cache"))),
+    };
+    folder.map(|folder| folder.join("lodc"))
+}
+
+fn seconds(text: &str) -> std::result::Result<Duration, String> {
+    let wrong = || "it is a number of seconds above 0, such as 0.5".to_owned();
+    let seconds: f64 = text.parse().map_err(|_| wrong())?;
+    match seconds > 0.0 && seconds <= 3600.0 {
+        true => Ok(Duration::from_secs_f64(seconds)),
+        false => Err(wrong()),
+    }
+}
+
+impl TimeArgs {
+    fn run_time(self) -> Result<RunTime> {
+        if !self.recordings.is_empty() {
+            if self.time == Some(TimeWord::Estimated) {
+                return Err(Diagnostic::error(
+                    "`--recordings` are measured times, and `--time estimated` asks for none",
+                )
+                .with_note("leave one of them out"));
+            }
+            let files = self.recordings;
+            return Ok(RunTime::Recorded(Recorded { files }));
+        }
+        if self.time != Some(TimeWord::Measured) {
+            let given = [
+                ("--time-budget", self.time_budget.is_some()),
+                ("--no-cache", self.no_cache),
+                ("--record", self.record.is_some()),
+                #[cfg(feature = "gpu")]
+                ("--adapter", self.adapter.is_some()),
+            ];
+            return match given.into_iter().find(|(_, given)| *given) {
+                None => Ok(RunTime::Estimated),
+                Some((flag, _)) => Err(Diagnostic::error(format!(
+                    "`{flag}` is about measured times, and times are estimated"
+                ))
+                .with_note("add `--time measured`")),
+            };
+        }
+        let program = std::env::current_exe().map_err(|error| {
+            Diagnostic::error("lodc cannot find its own file, which draws in a process of its own")
+                .with_reason(error)
+        })?;
+        let effort = Effort::default();
+        Ok(RunTime::Measured(Measuring {
+            program,
+            #[cfg(feature = "gpu")]
+            adapter: self.adapter,
+            #[cfg(not(feature = "gpu"))]
+            adapter: None,
+            cache: cache_folder().filter(|_| !self.no_cache),
+            record: self.record,
+            effort: Effort {
+                budget: self.time_budget.unwrap_or(effort.budget),
+                ..effort
+            },
+        }))
+    }
 }
 
 /// What a host may do.
@@ -502,6 +621,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.goal = arguments.goal;
     request.only = arguments.only;
     request.command = command_line();
+    request.time = arguments.time.run_time()?;
     let quiet = arguments.quiet;
     if arguments.locked {
         let (files, warnings) = compile::locked(&request)?;
@@ -520,6 +640,13 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
         .for_each(|warning| print_diagnostic(warning));
     if !quiet {
         print(&report::summary(&compiled.report));
+        if let Some(timings) = compiled.timings {
+            let compile::Timings { taken, found, .. } = timings;
+            print(&format!(
+                "  {:<16}{taken} taken, {found} found in what was timed before\n",
+                "timings"
+            ));
+        }
     }
     write(&compiled.files, quiet)?;
     if !quiet {

@@ -473,7 +473,7 @@ fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f { // lodc: keep
             let vertex = ready.vertex().expect("lodc supplies one");
             let stand = ready.stand(&vertex);
             let kept = ready.kept(&Request::default()).expect("they are known");
-            let found = find(&stand, (Scope::Levels, &kept), &|_| {}).expect("it runs");
+            let found = find(&stand, (Scope::Levels, &kept), None, &|_| {}).expect("it runs");
             assert!(found.levels.len() > 1, "there is no level");
             let rim = ValueId::from("fs_main.rim.pow");
             let of = |level: &crate::search::Level| level.shader.find(&rim).is_some();

@@ -1,5 +1,6 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
+use super::clock::Timings;
 use super::{Files, Request, normal_form, relative, textures};
 use crate::emit::{self, EmitLevel, Form, Lock, LockedGenerated, Output, figure};
 use crate::eval::draw::shade;
@@ -14,6 +15,7 @@ use crate::search::{
     self, Found, Level, Progress, SampleSet, Samples, Stand, coordinates_per_pixel,
     texels_per_pixel,
 };
+use crate::time::clock::{Clock, worst_ratio};
 use crate::{Diagnostic, Result};
 use lodc_passes::texture_collapse::MOST_TEXTURES;
 use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS, WITH_TEXTURES};
@@ -30,6 +32,8 @@ pub struct Compiled {
     pub report: Report,
     /// What is emitted.
     pub output: Output,
+    /// How many timings there were, where times were to be measured.
+    pub timings: Option<Timings>,
     /// What should be known, located.
     pub warnings: Vec<Box<Diagnostic>>,
 }
@@ -217,7 +221,12 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
 
     let stand = ready.stand(&vertex);
     let kept = ready.kept(request)?;
-    let found = search::find(&stand, (request.exact, &kept), progress)
+    let (mut watch, untimed) = match ready.watch(request)? {
+        Ok(watch) => (watch, None),
+        Err(warning) => (None, Some(warning)),
+    };
+    let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
+    let mut found = search::find(&stand, (request.exact, &kept), clock, progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     let written = found.written();
@@ -226,6 +235,13 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .collect();
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
+    let mut of_time: Vec<Box<Diagnostic>> = untimed.into_iter().collect();
+    if let Some(watch) = &mut watch {
+        watch.branches(&ready.base, &mut found.levels, &levels);
+        of_time.extend(watch.warnings(&found.levels));
+        let recording = watch.recording();
+        files.extend(recording.map(|(file, text)| (file, text.into_bytes())));
+    }
     let transitions = ready.transitions(&vertex, &found, &levels, emission)?;
     let textures = emit::generated_textures(&ready.source, &levels, emission.form)?;
     let made = textures::make(&ready.scene, &textures)?;
@@ -246,7 +262,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .extend(reached.iter().map(|w| w.message.clone()));
     let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
     let many = too_many(&ready.base, textures.len(), emission);
-    let visible: Vec<Box<Diagnostic>> = visible.into_iter().chain(many).collect();
+    let visible: Vec<Box<Diagnostic>> = visible.into_iter().chain(many).chain(of_time).collect();
     origin
         .warnings
         .extend(visible.iter().map(|w| w.message.clone()));
@@ -258,6 +274,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         files,
         report,
         output: emission,
+        timings: watch.map(|watch| watch.counts),
         warnings: ready
             .scene
             .warnings
@@ -321,6 +338,7 @@ fn emit_level(level: &Level, says: &str) -> EmitLevel {
         distance: figure(level.distance),
         error: figure(level.error.rmse),
         cost: figure(level.cost),
+        time: worst_ratio(&level.timed).map(figure),
         says: says.to_owned(),
     }
 }
@@ -516,6 +534,7 @@ impl Ready {
             goal: self.scene.goal,
             seed: self.scene.seed,
             rho0: figure(found.rho0),
+            timed_on: found.adapters.clone(),
             exact: match levels.is_empty() {
                 true => Recipe::default(),
                 false => found.exact.recipe.clone(),
@@ -533,6 +552,7 @@ impl Ready {
                     floor: figure(level.error.floor),
                     bound: figure(level.error.bound),
                     cost: emitted.cost,
+                    time: emitted.time,
                     says: emitted.says.clone(),
                     recipe: level.recipe.clone(),
                 })
@@ -592,7 +612,10 @@ pub fn trajectory(request: &Request) -> Result<Vec<search::Step>> {
     ready.ends(&vertex)?;
     let stand = ready.stand(&vertex);
     let kept = ready.kept(request)?;
-    search::trajectory(&stand, &kept, ready.scene.farthest)
+    // Why nothing is timed was said by the search.
+    let mut watch = ready.watch(request)?.unwrap_or_default();
+    let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
+    search::trajectory(&stand, &kept, ready.scene.farthest, clock)
         .map_err(|refused| refusal(&refused, &ready.source))
 }
 

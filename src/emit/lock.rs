@@ -46,6 +46,8 @@ pub struct Lock {
     pub seed: u64,
     /// Pixels on screen per object unit at the nearest distance, where autoLOD is 0.
     pub rho0: f64,
+    /// The adapters that the levels were timed on; none where times are estimated.
+    pub timed_on: Vec<String>,
     /// What costs no error: done to the original before the recipe of every level.
     pub exact: Recipe,
     /// The levels, nearest first: those below the original, and one at autoLOD 0 where something takes its place.
@@ -133,6 +135,9 @@ pub struct LockedLevel {
     pub bound: f64,
     /// Cost, as a share of the original's.
     pub cost: f64,
+    /// Run time, as a share of the original's, on the adapter that the lock names, or where it is worst of several; `None`
+    /// where it was not measured.
+    pub time: Option<f64>,
     /// What is paid in the band behind `autolod`, where the level before is drawn too, as a share of the original's
     /// time; `None` without a band, or when it is not known.
     pub band_cost: Option<f64>,
@@ -218,6 +223,10 @@ impl Lock {
         }
         line(format!("seed = {}", self.seed));
         line(format!("rho0 = {}", number(self.rho0)));
+        if !self.timed_on.is_empty() {
+            let adapters: Vec<String> = self.timed_on.iter().map(|name| string(name)).collect();
+            line(format!("timed_on = [{}]", adapters.join(", ")));
+        }
         if !self.textures.is_empty() {
             line("textures = [".to_owned());
             for texture in &self.textures {
@@ -268,8 +277,10 @@ impl Lock {
             ] {
                 line(format!("{key} = {}", number(value)));
             }
-            if let Some(cost) = level.band_cost {
-                line(format!("band_cost = {}", number(cost)));
+            for (key, value) in [("time", level.time), ("band_cost", level.band_cost)] {
+                if let Some(value) = value {
+                    line(format!("{key} = {}", number(value)));
+                }
             }
             line(format!("says = {}", string(&level.says)));
             line("recipe = [".to_owned());
@@ -344,6 +355,7 @@ impl Lock {
                 floor: level.floor,
                 bound: level.bound,
                 cost: level.cost,
+                time: level.time,
                 band_cost: level.band_cost,
                 says: level.says,
                 recipe,
@@ -382,6 +394,7 @@ impl Lock {
             },
             seed: raw.seed,
             rho0: raw.rho0,
+            timed_on: raw.timed_on,
             exact: recipe(raw.exact, &at)?,
             levels,
         })
@@ -443,6 +456,7 @@ impl Lock {
                     distance: level.distance,
                     error: level.error,
                     cost: level.cost,
+                    time: level.time,
                     says: level.says.clone(),
                 })
             })
@@ -567,6 +581,8 @@ struct RawLock {
     seed: u64,
     rho0: f64,
     #[serde(default)]
+    timed_on: Vec<String>,
+    #[serde(default)]
     exact: Vec<Spanned<RawStep>>,
     #[serde(default)]
     level: Vec<RawLevel>,
@@ -600,6 +616,7 @@ struct RawLevel {
     floor: f64,
     bound: f64,
     cost: f64,
+    time: Option<f64>,
     band_cost: Option<f64>,
     says: String,
     recipe: Vec<Spanned<RawStep>>,
@@ -717,6 +734,7 @@ mod tests {
             goal: "time=1,memory=0.2".parse().expect("it is one"),
             seed: u64::from(u32::MAX) + 7,
             rho0: 211.34,
+            timed_on: vec!["a \"GPU\", Vulkan".into()],
             exact: Recipe::default(),
             levels: vec![
                 LockedLevel {
@@ -726,6 +744,7 @@ mod tests {
                     floor: 1e-9,
                     bound: 0.02,
                     cost: 0.71,
+                    time: Some(0.625),
                     band_cost: Some(1.68),
                     says: "größe, \"so\" it\\is".into(),
                     recipe: Recipe(vec![
@@ -750,6 +769,7 @@ mod tests {
                     floor: 0.0,
                     bound: 0.0,
                     cost: 1e300,
+                    time: None,
                     band_cost: None,
                     says: String::new(),
                     recipe: Recipe::default(),

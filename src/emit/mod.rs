@@ -182,6 +182,8 @@ pub struct EmitLevel {
     pub error: f64,
     /// Cost, as a share of the original's.
     pub cost: f64,
+    /// Run time, as a share of the original's; `None` where it was not measured.
+    pub time: Option<f64>,
     /// What changed, for people: lower case, without a full stop.
     pub says: String,
 }
@@ -195,6 +197,7 @@ impl EmitLevel {
             distance: 0.0,
             error: 0.0,
             cost: 1.0,
+            time: None,
             says: "the original".to_owned(),
         }
     }
@@ -308,6 +311,21 @@ pub(crate) fn one_level(
     let read = read_back(&text, source)?;
     let files = written(source, &read, &text, target, name)?;
     Ok((read, files))
+}
+
+/// A variant as a text of its own, to be drawn and timed.
+///
+/// # Errors
+/// As [`emit_as`].
+#[cfg(feature = "search")]
+pub(crate) fn variant(source: &Source, shader: &Shader) -> Result<String> {
+    let source = &*composed::composed(source)?;
+    let level = EmitLevel {
+        autolod: 1.0,
+        says: "a variant".to_owned(),
+        ..EmitLevel::original(shader.clone())
+    };
+    level_alone(source, &[level], 1, "variant")
 }
 
 /// The text of one level alone.

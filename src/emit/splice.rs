@@ -475,24 +475,33 @@ fn indented(text: &str, by: &str) -> String {
 
 /// The comment at the top: a function of the levels and the file's name alone.
 fn header(source: &Source, levels: &[EmitLevel], stem: &str) -> String {
+    let timed = levels.iter().any(|level| level.time.is_some());
+    let column = |time: Option<f64>| match (timed, time) {
+        (false, _) => String::new(),
+        (true, Some(time)) => format!("{time:.2}  "),
+        (true, None) => "-     ".to_owned(),
+    };
     let mut out = format!(
         "// Levels of detail of {}, by lodc (lock format {FORMAT}). Made from {}.lod.toml: change that, not this.\n\
-         // level  autoLOD  error  cost  what changed\n",
+         // level  autoLOD  error  cost  {}what changed\n",
         file_name(source),
         stem,
+        if timed { "time  " } else { "" },
     );
     let (zero, above) = at_zero(levels);
-    let (cost, says) = zero.map_or((1.0, "the original"), |level| (level.cost, &*level.says));
-    let says = one_line(says);
-    writeln!(out, "// 0      0.00     -      {cost:.2}  {says}").ok();
+    let original = (1.0, Some(1.0), "the original");
+    let (cost, time, says) = zero.map_or(original, |l| (l.cost, l.time, &*l.says));
+    let (time, says) = (column(time), one_line(says));
+    writeln!(out, "// 0      0.00     -      {cost:.2}  {time}{says}").ok();
     for (at, level) in above.iter().enumerate() {
         writeln!(
             out,
-            "// {:<5}  {:<7.2}  {:.3}  {:.2}  {}",
+            "// {:<5}  {:<7.2}  {:.3}  {:.2}  {}{}",
             at + 1,
             level.autolod,
             level.error,
             level.cost,
+            column(level.time),
             one_line(&level.says)
         )
         .ok();

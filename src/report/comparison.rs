@@ -76,6 +76,7 @@ impl ComparedAt {
                     true => other.cost / original.cost,
                     false => 1.0,
                 },
+                estimated_time: other.used.work.total() / original.used.work.total(),
                 operations: other.used.work.operations(),
                 texture_samples: other.used.work.samples,
                 active_textures: other.used.textures,

@@ -13,6 +13,7 @@ pub use terminal::{inspection, next, summary, table};
 use crate::emit::LockedGenerated;
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level, work_of};
+use crate::time::{Timing, TimingWarning, Verdict};
 use lodc_passes::recipe::pass;
 use lodc_passes::{Class, Goal, Recipe, Shader, Stage};
 use serde::Serialize;
@@ -36,8 +37,10 @@ pub struct Report {
     pub bound: &'static str,
     /// What was to become cheaper: `time`, or as `--goal` says it.
     pub goal: String,
-    /// How many variants were measured.
+    /// How many variants' errors were measured.
     pub variants: u64,
+    /// How many variants were timed.
+    pub timed: usize,
     /// What costs no error, and is done before everything else that is done to a level; null when nothing was.
     pub exact: Option<ExactReport>,
     /// Level 0 first: the original, or what takes its place.
@@ -222,6 +225,87 @@ pub struct TimeReport {
     pub high: Option<f64>,
     /// The adapter, when measured.
     pub adapter: Option<String>,
+    /// How far the original was from itself on the spot, as the distance of a ratio from 1, when measured.
+    pub floor: Option<f64>,
+    /// `no difference`, `faster` or `slower`, when measured.
+    pub verdict: Option<Verdict>,
+    /// What is to be known before it is believed.
+    pub warnings: Vec<TimingWarning>,
+    /// The ratio, its interval and what is said of it where the text that holds all levels branches by a uniform, when
+    /// that was timed.
+    pub branching: Option<BranchingReport>,
+    /// The same of the other adapters, where recordings of several stand in.
+    pub others: Vec<TimeReport>,
+}
+
+/// The run time of a level in the text that holds all levels and branches, as a share of the original's alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BranchingReport {
+    /// The ratio.
+    pub ratio: f64,
+    /// Lower end of its interval.
+    pub low: f64,
+    /// Upper end of its interval.
+    pub high: f64,
+    /// What can be said of it.
+    pub verdict: Verdict,
+}
+
+impl TimeReport {
+    /// A share of the original's time as the cost model has it.
+    fn estimated(ratio: f64) -> Self {
+        Self {
+            kind: "estimated",
+            ms: None,
+            ratio,
+            low: None,
+            high: None,
+            adapter: None,
+            floor: None,
+            verdict: None,
+            warnings: Vec::new(),
+            branching: None,
+            others: Vec::new(),
+        }
+    }
+
+    fn measured(timing: &Timing, branching: Option<&Timing>, adapter: &str) -> Self {
+        Self {
+            kind: "measured",
+            ms: Some(timing.ms),
+            ratio: timing.ratio,
+            low: Some(timing.low),
+            high: Some(timing.high),
+            adapter: Some(adapter.to_owned()),
+            floor: Some(timing.floor),
+            verdict: Some(timing.verdict()),
+            warnings: timing.warnings.clone(),
+            branching: branching.map(|branching| BranchingReport {
+                ratio: branching.ratio,
+                low: branching.low,
+                high: branching.high,
+                verdict: branching.verdict(),
+            }),
+            others: Vec::new(),
+        }
+    }
+
+    /// What was measured on the adapter where it is worst, with the others behind it; the estimate where nothing was.
+    fn of(estimate: f64, (timed, branching): (&[Timing], &[Timing]), adapters: &[String]) -> Self {
+        let each = timed.iter().zip(adapters).enumerate();
+        let mut all: Vec<Self> = each
+            .map(|(at, (timing, adapter))| Self::measured(timing, branching.get(at), adapter))
+            .collect();
+        all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+        let mut all = all.into_iter();
+        match all.next() {
+            Some(worst) => Self {
+                others: all.collect(),
+                ..worst
+            },
+            None => Self::estimated(estimate),
+        }
+    }
 }
 
 /// The work of a level.
@@ -229,6 +313,8 @@ pub struct TimeReport {
 pub struct CostReport {
     /// What it costs by the goal, as a share of the original's.
     pub ratio: f64,
+    /// The run time as a share of the original's, as the cost model has it.
+    pub estimated_time: f64,
     /// Arithmetic of a covered fragment, in full-rate scalar operations.
     pub operations: f64,
     /// Texture samples of a covered fragment.
@@ -298,8 +384,10 @@ pub struct FrontierReport {
     pub distance: f64,
     /// RMSE on the search set.
     pub rmse: f64,
-    /// Cost as a share of the original's.
+    /// Cost as a share of the original's, estimated.
     pub cost: f64,
+    /// Its run time, where it was measured.
+    pub time: Option<TimeReport>,
     /// Its derivation, a step a string.
     pub recipe: Vec<String>,
 }
@@ -342,6 +430,11 @@ impl Report {
     ) -> Self {
         let level = |(at, (level, says)): (usize, (&Level, &String))| LevelReport {
             transition: origin.transitions.get(at).cloned().flatten(),
+            time: TimeReport::of(
+                level.time,
+                (&level.timed, &level.branching),
+                &found.adapters,
+            ),
             ..level_report(level, says.clone(), base, source, &origin)
         };
         Self {
@@ -359,7 +452,10 @@ impl Report {
                 .enumerate()
                 .map(level)
                 .collect(),
-            frontier: found.distances.iter().flat_map(frontier).collect(),
+            frontier: (found.distances.iter())
+                .flat_map(|at| frontier(at, &found.adapters))
+                .collect(),
+            timed: found.timed,
             left_out: exact::left_out(found, base, source)
                 .into_iter()
                 .chain(found.distances.iter().filter_map(withdrawn))
@@ -419,16 +515,10 @@ fn level_report(
         distance: level.distance,
         says,
         error: ErrorReport::new(&level.error, level.flip, level.held_out.as_ref()),
-        time: TimeReport {
-            kind: "estimated",
-            ms: None,
-            ratio: level.time,
-            low: None,
-            high: None,
-            adapter: None,
-        },
+        time: TimeReport::estimated(level.time),
         cost: CostReport {
             ratio: level.cost,
+            estimated_time: level.time,
             operations: level.used.work.operations(),
             texture_samples: level.used.work.samples,
             active_textures: level.used.textures,
@@ -485,16 +575,24 @@ fn withdrawn(at: &AtDistance) -> Option<String> {
     ))
 }
 
-fn frontier(at: &AtDistance) -> impl Iterator<Item = FrontierReport> + '_ {
-    at.frontier.iter().map(|seen| FrontierReport {
-        distance: at.distance,
-        rmse: seen.square.sqrt(),
-        cost: match at.original > 0.0 {
-            true => seen.cost / at.original,
-            false => 1.0,
-        },
-        recipe: seen.recipe.0.iter().map(ToString::to_string).collect(),
-    })
+fn frontier<'a>(
+    at: &'a AtDistance,
+    adapters: &'a [String],
+) -> impl Iterator<Item = FrontierReport> + 'a {
+    at.frontier
+        .iter()
+        .enumerate()
+        .map(move |(i, seen)| FrontierReport {
+            time: (at.timed.get(i).filter(|timed| !timed.is_empty()))
+                .map(|timed| TimeReport::of(1.0, (timed, &[]), adapters)),
+            distance: at.distance,
+            rmse: seen.square.sqrt(),
+            cost: match at.original > 0.0 {
+                true => seen.cost / at.original,
+                false => 1.0,
+            },
+            recipe: seen.recipe.0.iter().map(ToString::to_string).collect(),
+        })
 }
 
 /// Where a value of a source's normal form is in its files; `None` when it has no place there.

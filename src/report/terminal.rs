@@ -1,9 +1,10 @@
 //! The report as a person sees it in a terminal: a table of levels, a table of sites.
 
-use super::{CostReport, Report, place_of};
+use super::{CostReport, Report, TimeReport, place_of};
 use crate::emit::{Form, Output};
 use crate::front::{Place, Source};
 use crate::search::Measured;
+use crate::time::Verdict;
 use lodc_passes::{
     Candidate, Facts, Rates, Shader, Stage, WITH_PARAMETERS, WITH_TEXTURES, texture_removal,
 };
@@ -26,7 +27,7 @@ pub fn table(report: &Report) -> String {
             "floor",
             "excess",
             "bound",
-            "cost",
+            if is_timed(report) { "time" } else { "cost" },
             "samples",
             "what changed",
         ]
@@ -43,7 +44,7 @@ pub fn table(report: &Report) -> String {
             format!("{:.3}", level.error.floor),
             unless(format!("{:.3}", level.error.excess)),
             unless(format!("{:.3}", level.error.bound)),
-            format!("{:.2}", level.time.ratio),
+            time(&level.time),
             samples(level.cost.texture_samples),
             level.says.clone(),
         ]);
@@ -54,6 +55,91 @@ pub fn table(report: &Report) -> String {
             true, false, false, false, false, false, false, false, false, true,
         ],
     )
+}
+
+/// Whether the levels were timed.
+fn is_timed(report: &Report) -> bool {
+    let mut levels = report.levels.iter();
+    levels.any(|level| level.time.kind == "measured")
+}
+
+/// A share of the original's time, with its interval where it was measured.
+fn time(time: &TimeReport) -> String {
+    match (time.low, time.high) {
+        (Some(low), Some(high)) => {
+            // An interval that is narrower than what is printed would look like none.
+            let off = (high - time.ratio).max(time.ratio - low).max(0.0005);
+            format!("{:.3} +- {off:.3}", time.ratio)
+        }
+        _ => format!("{:.2}", time.ratio),
+    }
+}
+
+/// How the levels were timed.
+fn timed(report: &Report) -> String {
+    let mut out = String::new();
+    for level in &report.levels {
+        for time in std::iter::once(&level.time).chain(&level.time.others) {
+            let Some(adapter) = &time.adapter else {
+                continue;
+            };
+            let line = format!(
+                "  time is measured on {adapter}, as a share of the original's at the same distance, with 99 % intervals\n"
+            );
+            if !out.contains(&line) {
+                out.push_str(&line);
+            }
+        }
+    }
+    let estimated = report
+        .levels
+        .iter()
+        .skip(1)
+        .filter(|level| level.time.kind != "measured");
+    if !out.is_empty() && estimated.count() > 0 {
+        out.push_str("  a time without an interval is estimated\n");
+    }
+    let each = |of: &dyn Fn(&TimeReport) -> Option<String>| -> Vec<String> {
+        let levels = report.levels.iter().enumerate();
+        levels
+            .filter_map(|(i, level)| Some(format!("{} of level {i}", of(&level.time)?)))
+            .collect()
+    };
+    for (title, all) in [
+        (
+            "estimated before",
+            match out.is_empty() {
+                true => Vec::new(),
+                false => (report.levels.iter().enumerate())
+                    .filter(|(_, level)| level.time.kind == "measured")
+                    .map(|(i, level)| format!("{:.2} of level {i}", level.cost.estimated_time))
+                    .collect(),
+            },
+        ),
+        (
+            "noise floor",
+            each(&|time| Some(format!("{:.3}", time.floor?))),
+        ),
+        (
+            "with the branch of `--form uniform`",
+            each(&|time| {
+                let branching = time.branching.as_ref()?;
+                Some(format!("{:.3}", branching.ratio))
+            }),
+        ),
+        (
+            "no difference to the original beyond the noise",
+            each(&|time| {
+                let same = time.verdict == Some(Verdict::NoDifference);
+                same.then(|| format!("{:.3}", time.ratio))
+            }),
+        ),
+    ] {
+        if !all.is_empty() {
+            let _ = writeln!(out, "  {title}: {}", all.join(", "));
+        }
+    }
+    out
 }
 
 /// Samples of a fragment on average: to a tenth, whole numbers without a point.
@@ -74,10 +160,20 @@ pub fn summary(report: &Report) -> String {
     for (i, inference) in report.inferences.iter().enumerate() {
         line(if i == 0 { "inferred" } else { "" }, inference);
     }
-    line("searched", &format!("{} variants", report.variants));
+    let timed_too = match report.timed {
+        0 => String::new(),
+        timed => format!(", {timed} of them timed"),
+    };
+    line(
+        "searched",
+        &format!("{} variants{timed_too}", report.variants),
+    );
     out.push('\n');
     out.push_str(&table(report));
-    out.push_str(&cost(report));
+    out.push_str(&timed(report));
+    if !is_timed(report) || report.goal != "time" {
+        out.push_str(&cost(report));
+    }
     out.push_str(&exact(report));
     out.push_str(&held_out(report));
     out.push_str(&transitions(report));

@@ -209,6 +209,8 @@ impl<'a> Checks<'a> {
             used: measured.used,
             cost: start.share(measured.cost),
             time: measured.used.work.total() / original.used.work.total(),
+            timed: Vec::new(),
+            branching: Vec::new(),
             with_parameters,
             with_textures,
             error_after: error_after(self.base, &recipe, search),

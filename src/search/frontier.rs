@@ -16,18 +16,40 @@ pub struct Seen {
     pub cost: f64,
 }
 
+/// How many feasible variants are remembered beside the members.
+const NEAR: usize = 1024;
+
 /// The members that no other member beats in both error and cost, cheapest first.
 #[derive(Clone, Debug, Default)]
 pub struct Frontier {
     members: Vec<Seen>,
+    /// What is feasible and costs least, members or not, where that is wanted.
+    near: Option<Vec<Seen>>,
 }
 
 impl Frontier {
+    /// A frontier that remembers what is beaten, too: by another measure of cost it may not be.
+    pub(super) fn with_near() -> Self {
+        Self {
+            near: Some(Vec::new()),
+            ..Self::default()
+        }
+    }
+
     /// Adds a variant, unless a member is at least as good in both, and drops those that it beats.
     pub fn add(&mut self, seen: Seen) {
         let cost = seen.cost;
         if !(seen.strain.is_finite() && cost.is_finite()) {
             return;
+        }
+        if let Some(near) = &mut self.near
+            && seen.strain <= 1.0
+        {
+            near.push(seen.clone());
+            if near.len() > 2 * NEAR {
+                near.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+                near.truncate(NEAR);
+            }
         }
         // Members are sorted by cost up, and so by error down.
         let at = self.members.partition_point(|member| member.cost <= cost);
@@ -48,6 +70,11 @@ impl Frontier {
     /// The members, cheapest first.
     pub fn members(&self) -> &[Seen] {
         &self.members
+    }
+
+    /// What it remembers of what is feasible, in no order that means anything.
+    pub(super) fn near(&self) -> &[Seen] {
+        self.near.as_deref().unwrap_or_default()
     }
 }
 

@@ -16,8 +16,11 @@ use super::interval::Interval;
 use super::kept::Kept;
 use super::parameters;
 use super::samples::{SampleSet, Samples, Stand};
+use super::timed::{Timed, Times};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
+use crate::time::clock::{Clock, is_faster, worst_ratio};
+use crate::time::{Timing, Verdict};
 use lodc_passes::{Recipe, Shader, Used};
 
 /// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
@@ -48,6 +51,10 @@ pub struct Level {
     pub cost: f64,
     /// The work as a share of the original's at the same distance: an estimate of the run time.
     pub time: f64,
+    /// Its run time at `distance`, of each adapter; none where it was not timed.
+    pub timed: Vec<Timing>,
+    /// The same of the text that holds all levels and branches, where that was timed.
+    pub branching: Vec<Timing>,
     /// What `cost` would be with all that is the same for a whole draw moved to parameters, where the host does not allow
     /// that and it would be less.
     pub with_parameters: Option<f64>,
@@ -72,10 +79,18 @@ impl Level {
             used: set.original().used,
             cost: 1.0,
             time: 1.0,
+            timed: Vec::new(),
+            branching: Vec::new(),
             with_parameters: None,
             with_textures: None,
             error_after: Vec::new(),
         }
+    }
+
+    /// Whether it was timed, and is faster than the original beyond the noise on every adapter.
+    fn is_faster(&self) -> bool {
+        let mut timed = self.timed.iter();
+        !self.timed.is_empty() && timed.all(|timing| timing.verdict() == Verdict::Faster)
     }
 
     /// What draws the same for less, at the nearest distance.
@@ -121,6 +136,8 @@ pub struct AtDistance {
     pub floor_square: f64,
     /// Cheapest first.
     pub frontier: Vec<Seen>,
+    /// The run times of those, each of every adapter; none of what was not timed.
+    pub timed: Vec<Vec<Timing>>,
     /// How many variants were within the bound on all samples of the scene and were withdrawn, because on pictures
     /// that the search had not seen they were not.
     pub withdrawn: usize,
@@ -137,6 +154,10 @@ pub struct Found {
     pub distances: Vec<AtDistance>,
     /// How many variants were measured.
     pub variants: u64,
+    /// How many of them were timed.
+    pub timed: usize,
+    /// The adapters that timed them.
+    pub adapters: Vec<String>,
     /// Pixels per object unit at the nearest distance, where autoLOD is 0.
     pub rho0: f64,
 }
@@ -166,14 +187,18 @@ pub struct Progress {
 /// Searches the levels of a shader in a scene: what costs no error first, then greedy at each distance, every variant that
 /// was seen on the frontier, frontier members confirmed on the full set.
 ///
+/// With a clock, variants are timed, and chosen by that; without, by their estimated time.
+///
 /// # Errors
 /// When the evaluator refuses the original, at the expression.
 pub fn find(
     stand: &Stand<'_>,
     (scope, kept): (Scope, &Kept),
+    clock: Option<&mut dyn Clock>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, Refused> {
     let scene = stand.scene;
+    let mut times = clock.map(Times::new);
     let distances = &scene.distances;
     let nearest = SampleSet::new(stand, distances[0], Samples::Full)?;
     let exact = match scope {
@@ -184,6 +209,12 @@ pub fn find(
         true => Level::exact(stand, &nearest, &exact),
         false => Level::original(stand, &nearest),
     }];
+    if let Some(times) = &mut times
+        && !levels[0].is_original
+    {
+        let timed = times.clock.time(&[&levels[0].shader], distances[0]).pop();
+        levels[0].timed = timed.unwrap_or_default();
+    }
     // Where the original uses nothing of what is to become less, there is nothing to look for.
     let distances = match scene.goal.is_reached(&nearest.original().used) {
         true => &distances[..1],
@@ -193,7 +224,7 @@ pub fn find(
     let mut seen = Vec::new();
     let mut prices = Prices::default();
     let mut guard = Guard::new(stand, kept);
-    let mut variants = 0;
+    let (mut variants, mut timed_variants) = (0, 0);
     let mut before_checks = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
         let next = distances.get(at + 1).copied().unwrap_or(distance * 2.0);
@@ -207,7 +238,10 @@ pub fn find(
             checks: &checks,
             guard: &mut guard,
             prices: &mut prices,
-            frontier: Frontier::default(),
+            frontier: match times {
+                Some(_) => Frontier::with_near(),
+                None => Frontier::default(),
+            },
             found: None,
             variants,
             withdrawn: 0,
@@ -234,6 +268,10 @@ pub fn find(
             bottom.judge(&base)?;
         }
         bottom.find(&base, start)?;
+        let timed = match &mut times {
+            Some(times) => bottom.choose_by(times)?,
+            None => Timed::default(),
+        };
         let Bottom {
             frontier,
             found,
@@ -242,10 +280,37 @@ pub fn find(
             ..
         } = bottom;
         variants = measured;
+        timed_variants += timed.count;
         let found = found.and_then(|found| checks.level(&found, search.start(), kept));
         // What vertices do weighs more the farther away it is.
         let cost_here = checks.cost(&before.shader)?;
-        let worth = |level: &Level| level.cost < (1.0 - MERGE_BELOW) * cost_here;
+        // The steps of what was found were sifted since, and the level before is judged where this one begins.
+        let mut before_here = Vec::new();
+        let found = match (found, &mut times) {
+            (Some(level), Some(times)) => {
+                let mut timed = times.clock.time(&[&level.shader, &before.shader], distance);
+                before_here = timed.pop().unwrap_or_default();
+                let timed = timed.pop().unwrap_or_default();
+                Some(Level { timed, ..level })
+            }
+            (found, _) => found,
+        };
+        // What the clock says of both decides where time is all that counts; noise is no gain.
+        let by_time = scene.goal.weight_of_time() == 1.0;
+        let time_here = match before.is_original {
+            true => Some(1.0),
+            false => worst_ratio(&before_here),
+        };
+        let worth = |level: &Level| match (worst_ratio(&level.timed), time_here) {
+            (Some(time), Some(here)) if by_time => {
+                let gains = match before.is_original {
+                    true => level.is_faster(),
+                    false => is_faster(&level.timed, &before_here),
+                };
+                gains && time < (1.0 - MERGE_BELOW) * here
+            }
+            _ => level.cost < (1.0 - MERGE_BELOW) * cost_here,
+        };
         // Without a level here the one before is used on, where it has not been looked at yet.
         let next_level = match found {
             Some(level) if worth(&level) => Some(level),
@@ -267,6 +332,7 @@ pub fn find(
             original: original.cost,
             floor_square: original.error.square(),
             frontier: frontier.members().to_vec(),
+            timed: timed.frontier,
             withdrawn,
         });
     }
@@ -275,6 +341,8 @@ pub fn find(
         levels,
         distances: seen,
         variants,
+        timed: timed_variants,
+        adapters: times.map_or_else(Vec::new, |times| times.clock.adapters().to_vec()),
         rho0: scene.rho0(),
     })
 }

@@ -30,6 +30,7 @@ mod parameters;
 mod programs;
 pub mod samples;
 mod textures;
+mod timed;
 mod trajectory;
 
 pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};

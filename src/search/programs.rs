@@ -479,7 +479,7 @@ mod tests {
                 scene: &scene,
             };
             found.push(
-                find(&stand, (Scope::None, &Kept::default()), &|_| {})
+                find(&stand, (Scope::None, &Kept::default()), None, &|_| {})
                     .expect("it runs")
                     .levels,
             );

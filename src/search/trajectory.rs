@@ -10,7 +10,9 @@ use super::interval::Interval;
 use super::kept::Kept;
 use super::samples::{Measured, Samples, Stand};
 use crate::eval::program::Refused;
-use lodc_passes::{Recipe, Used};
+use crate::time::Timing;
+use crate::time::clock::Clock;
+use lodc_passes::{Recipe, Shader, Used};
 
 /// One variant on the way from the original to the end, as the samples of a search see it.
 #[derive(Clone, Debug)]
@@ -25,6 +27,8 @@ pub struct Step {
     pub excess: f64,
     /// How much of its bound it uses up: within it when at most 1.
     pub strain: f64,
+    /// Its run time at that distance, of each adapter; none where it was not timed.
+    pub timed: Vec<Timing>,
 }
 
 /// The variants that the greedy loop passes through at a distance, the original first, until nothing is left that saves
@@ -32,7 +36,12 @@ pub struct Step {
 ///
 /// # Errors
 /// When the evaluator refuses the original, at the expression.
-pub fn trajectory(stand: &Stand<'_>, kept: &Kept, distance: f64) -> Result<Vec<Step>, Refused> {
+pub fn trajectory(
+    stand: &Stand<'_>,
+    kept: &Kept,
+    distance: f64,
+    clock: Option<&mut dyn Clock>,
+) -> Result<Vec<Step>, Refused> {
     let interval = Interval::new(stand, &[distance], Samples::Search)?;
     let guard = Guard::unbounded(stand, kept);
     let original = Variant::new(&interval, Recipe::default(), stand.base.clone())?;
@@ -43,8 +52,16 @@ pub fn trajectory(stand: &Stand<'_>, kept: &Kept, distance: f64) -> Result<Vec<S
         progress: &|_, _| {},
     }
     .run(&mut way, &mut Prices::default(), &mut Frontier::default());
+    let shaders: Vec<&Shader> = way.iter().map(|stop| &stop.variant.shader).collect();
+    let mut timed = clock
+        .map(|clock| clock.time(&shaders, distance).into_iter())
+        .into_iter()
+        .flatten();
+    let timed: Vec<Vec<Timing>> = (0..way.len())
+        .map(|_| timed.next().unwrap_or_default())
+        .collect();
     let floor = interval.start().original().error.square();
-    let steps = way.into_iter().map(|stop| {
+    let steps = way.into_iter().zip(timed).map(|(stop, timed)| {
         let Variant {
             recipe, measured, ..
         } = stop.variant;
@@ -61,6 +78,7 @@ pub fn trajectory(stand: &Stand<'_>, kept: &Kept, distance: f64) -> Result<Vec<S
             cost: interval.start().share(cost),
             excess: (error.square() - floor).max(0.0).sqrt(),
             strain,
+            timed,
         }
     });
     Ok(steps.collect())
@@ -99,7 +117,7 @@ mod tests {
             only: ["texture-removal".to_owned()].into(),
             ..Kept::default()
         };
-        trajectory(&stand, &kept, scene.farthest).expect("it runs")
+        trajectory(&stand, &kept, scene.farthest, None).expect("it runs")
     }
 
     #[test]

@@ -4,12 +4,16 @@
 //! rounds of (original, variants, original) --statistics--> Timing: ratio, its interval, the noise floor, warnings
 //! Timing --verdict--> no difference, faster, slower
 //! what a draw executes --model--> its time, predicted
+//! Timings --store--> kept on disk, or recorded, to stand in for a device
+//! [Shader] --clock--> [Timing]                       what a search asks
 //! ```
 //!
 //! The GPU's part, which takes the times, is `gpu::time`. Nothing here knows a device.
 
+pub mod clock;
 pub mod model;
 pub mod statistics;
+pub mod store;
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -155,22 +159,35 @@ impl Default for Effort {
 }
 
 #[cfg(test)]
+impl Timing {
+    /// A timing that tests make up: a ratio, the distance of its interval's ends, and the noise floor.
+    pub(crate) fn made_up(ratio: f64, off: f64, floor: f64) -> Self {
+        Self {
+            ms: ratio,
+            original_ms: 1.0,
+            ratio,
+            low: ratio - off,
+            high: ratio + off,
+            floor,
+            rounds: 20,
+            draws: 4,
+            compile_ms: 1.0,
+            warnings: Vec::new(),
+            statistics: None,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     fn timing(low: f64, high: f64, floor: f64) -> Timing {
         Timing {
-            ms: 1.0,
-            original_ms: 1.0,
-            ratio: 1.0,
             low,
             high,
-            floor,
-            rounds: 20,
-            draws: 4,
-            compile_ms: 1.0,
             warnings: vec![TimingWarning::ClockDrift, TimingWarning::SoftwareAdapter],
-            statistics: None,
+            ..Timing::made_up(1.0, 0.0, floor)
         }
     }
 

@@ -41,6 +41,7 @@ fn levels_that_work_in_the_vertex_stage_are_drawn_alike() {
             distance: scene.nearest,
             error: 0.0,
             cost: 1.0,
+            time: None,
             says: "moved".into(),
         };
         let near = scene.frames(scene.distances[0]).swap_remove(0);

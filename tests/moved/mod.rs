@@ -25,6 +25,7 @@ pub(crate) fn with_parameters(path: &Path) -> (Shader, Files) {
         distance: 1.0,
         error: 0.0,
         cost: 1.0,
+        time: None,
         says: "a variant".into(),
     };
     let files = emit::emit(&source, &base, &[level], Output::default());

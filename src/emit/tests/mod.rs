@@ -24,6 +24,7 @@ fn level(source: &Source, autolod: f32) -> EmitLevel {
         distance: 2.0,
         error: 0.019,
         cost: 0.5,
+        time: None,
         says: "detail left out".to_owned(),
     }
 }

@@ -116,6 +116,8 @@ struct Request {
 /// What is to be done with a subject.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Task {
+    /// The adapter says what it is called; the subject is not read.
+    Name,
     /// A picture is drawn.
     Draw { variant: Variant, wanted: Wanted },
     /// Variants are timed against the original.
@@ -132,6 +134,8 @@ enum Task {
 enum Answer {
     /// A picture in fine pixels; its colours and then its coverage are the numbers behind it.
     Picture { width: u32, height: u32 },
+    /// What the adapter and its driver are called; no numbers are behind it.
+    Name(String),
     /// What was found of each variant; no numbers are behind it.
     Timed(Vec<Result<Timing, Said>>),
     /// The device cannot, or the input is bad.

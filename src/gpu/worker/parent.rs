@@ -135,7 +135,7 @@ impl Worker {
         let (answer, numbers) = self.ask(&request, self.patience)?;
         match answer {
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
-            Answer::Timed(_) => Err(Failure::Refused(confused())),
+            Answer::Timed(_) | Answer::Name(_) => Err(Failure::Refused(confused())),
             Answer::Picture { width, height } => {
                 let count = width as usize * height as usize;
                 let (colours, covered) = numbers.split_at(numbers.len().min(4 * count));
@@ -146,6 +146,23 @@ impl Worker {
                     covered: covered.to_vec(),
                 })
             }
+        }
+    }
+
+    /// What the adapter is called, with its interface and its driver.
+    ///
+    /// # Errors
+    /// When there is no such adapter, or its driver fails.
+    pub fn label(&mut self) -> Result<String, Failure> {
+        let request = Request {
+            adapter: self.adapter.clone(),
+            subject: Subject::default(),
+            task: Task::Name,
+        };
+        match self.ask(&request, self.patience)?.0 {
+            Answer::Name(name) => Ok(name),
+            Answer::Refused(said) => Err(Failure::Refused(said.error())),
+            _ => Err(Failure::Refused(confused())),
         }
     }
 

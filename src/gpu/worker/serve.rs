@@ -194,6 +194,11 @@ fn answer<'g>(
     subject: &mut Option<Loaded<'g>>,
     request: &Request,
 ) -> Result<(Answer, Vec<f32>)> {
+    if request.task == Task::Name {
+        let label = gpu.label();
+        let name = format!("{label}, {}", label.driver);
+        return Ok((Answer::Name(name), Vec::new()));
+    }
     let mut loaded = match subject.take() {
         Some(loaded) if loaded.subject == request.subject => loaded,
         _ => Loaded::new(gpu, &request.subject)?,
@@ -205,6 +210,7 @@ fn answer<'g>(
             distance,
             effort,
         } => time(&mut loaded, variants, *distance, effort).map(|answer| (answer, Vec::new())),
+        Task::Name => Err(Diagnostic::error("it was answered before")),
     };
     *subject = Some(loaded);
     answered

@@ -1,0 +1,411 @@
+//! The clock of a search: variants as text, timed on a device, found in what was timed before, or found in recordings.
+//!
+//! ```text
+//! Shader --emit--> text --Key--> recording, cache, or a device in a child process --> Timing
+//! ```
+
+use super::search::Ready;
+use super::{Recorded, Request, RunTime};
+use crate::emit::{self, EmitLevel, Form, Output};
+use crate::front::Source;
+use crate::search::Level;
+use crate::time::clock::Clock;
+use crate::time::store::{Key, Recording};
+use crate::time::{Timing, TimingWarning, Verdict};
+use crate::{Diagnostic, Result};
+use lodc_passes::Shader;
+use std::collections::BTreeSet;
+
+#[cfg(feature = "gpu")]
+use super::Measuring;
+#[cfg(feature = "gpu")]
+use crate::gpu::worker::{Subject, Variant, Worker};
+#[cfg(feature = "gpu")]
+use crate::time::store::{Cache, MOST};
+
+/// What times the variants of one shader in its scene.
+pub(super) struct Watch<'a> {
+    source: &'a Source,
+    /// The hash of all that is drawn beside the variant.
+    drawn: Key,
+    adapters: Vec<String>,
+    taken: Taken<'a>,
+    /// What was timed, and where it was found.
+    pub(super) counts: Timings,
+    /// What could not be timed, said once each.
+    problems: BTreeSet<String>,
+}
+
+/// How many timings there were.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// Taken on the device.
+    pub taken: usize,
+    /// Found in the cache, or in recordings.
+    pub found: usize,
+    /// That nobody could give.
+    pub missing: usize,
+}
+
+/// Where timings come from.
+enum Taken<'a> {
+    #[cfg(feature = "gpu")]
+    Device(Box<Device<'a>>),
+    Recordings(Vec<Recording>, std::marker::PhantomData<&'a ()>),
+}
+
+#[cfg(feature = "gpu")]
+struct Device<'a> {
+    worker: Worker,
+    subject: Subject,
+    measuring: &'a Measuring,
+    cache: Option<Cache>,
+    /// All that was timed here.
+    recording: Recording,
+}
+
+/// A text that is timed, and what `autoLOD` is in it.
+type Text = (String, Option<f64>);
+
+impl Ready {
+    /// The clock that a request asks for; none where times are estimated. What keeps it from being used is a warning: the
+    /// search goes on with estimates.
+    pub(super) fn watch<'a>(
+        &'a self,
+        request: &'a Request,
+    ) -> Result<std::result::Result<Option<Watch<'a>>, Box<Diagnostic>>> {
+        let watch = |adapters, taken| Watch {
+            source: &self.source,
+            drawn: self.drawn(),
+            adapters,
+            taken,
+            counts: Timings::default(),
+            problems: BTreeSet::new(),
+        };
+        match &request.time {
+            RunTime::Estimated => Ok(Ok(None)),
+            RunTime::Recorded(Recorded { files }) => {
+                let all = files.iter().map(|file| Recording::read(file));
+                let all: Vec<Recording> = all.collect::<Result<_>>()?;
+                let adapters = all.iter().map(|recording| recording.adapter.clone());
+                let adapters = adapters.collect();
+                let taken = Taken::Recordings(all, std::marker::PhantomData);
+                Ok(Ok(Some(watch(adapters, taken))))
+            }
+            #[cfg(feature = "gpu")]
+            RunTime::Measured(measuring) => Ok(match self.device(measuring) {
+                Ok(device) => {
+                    let adapters = vec![device.recording.adapter.clone()];
+                    Ok(Some(watch(adapters, Taken::Device(Box::new(device)))))
+                }
+                Err(error) => Err(untimed(&error)),
+            }),
+            #[cfg(not(feature = "gpu"))]
+            RunTime::Measured(_) => {
+                let error = Diagnostic::error("this lodc was built without the feature `gpu`");
+                Ok(Err(untimed(&error)))
+            }
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn device<'a>(&'a self, measuring: &'a Measuring) -> Result<Device<'a>> {
+        let adapter = measuring.adapter.clone();
+        let program = measuring.program.clone();
+        let mut worker = Worker::new(program, adapter.clone(), PATIENCE);
+        let name = worker.label();
+        let name = name.map_err(|failure| failure.diagnostic(adapter.as_deref()))?;
+        let cache = measuring.cache.as_ref();
+        let cache = cache.map(|folder| Cache::new(folder, &name));
+        if let Some(cache) = &cache {
+            cache.sweep(MOST);
+        }
+        Ok(Device {
+            worker,
+            subject: Subject::new(
+                self.request.shader.clone(),
+                self.scene_file.clone(),
+                &self.request.stages,
+                &self.request.modules,
+            ),
+            measuring,
+            cache,
+            recording: Recording::new(&name),
+        })
+    }
+
+    /// The hash of everything that decides what is drawn, but the variant and the distance.
+    fn drawn(&self) -> Key {
+        let inputs = self.scene.inputs.iter().map(|input| input.hash.clone());
+        let definitions = self.request.modules.definitions.iter();
+        let stages = [
+            self.source.vertex.clone(),
+            Some(self.source.fragment.clone()),
+        ];
+        let words: Vec<String> = inputs
+            .chain(stages.into_iter().map(Option::unwrap_or_default))
+            .chain(definitions.map(ToString::to_string))
+            .collect();
+        Key::of(words.iter().map(String::as_bytes))
+    }
+}
+
+/// How long a device may be silent: a timing, with the compilation of its shaders. Software takes its time.
+#[cfg(feature = "gpu")]
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(120);
+
+fn untimed(error: &Diagnostic) -> Box<Diagnostic> {
+    let mut warning = Diagnostic::warning(format!(
+        "nothing was timed, and all times are estimated: {}",
+        error.message
+    ));
+    warning.notes.clone_from(&error.notes);
+    warning
+}
+
+impl Watch<'_> {
+    /// Times texts against the original at a distance; for each one timing for each adapter, or none at all.
+    fn take(&mut self, texts: &[Option<Text>], distance: f64) -> Vec<Vec<Timing>> {
+        let drawn = self.drawn.to_string();
+        let key = |(text, auto_lod): &Text, effort: &[u8]| {
+            let auto_lod = auto_lod.map_or([0; 8], f64::to_le_bytes);
+            let distance = distance.to_le_bytes();
+            Key::of([
+                drawn.as_bytes(),
+                text.as_bytes(),
+                &auto_lod,
+                &distance,
+                effort,
+            ])
+        };
+        let timings: Vec<Vec<Timing>> = match &mut self.taken {
+            Taken::Recordings(recordings, _) => texts
+                .iter()
+                .map(|text| {
+                    let key = key(text.as_ref()?, b"");
+                    let each = recordings.iter().map(|of| of.timings.get(&key).cloned());
+                    each.collect::<Option<Vec<Timing>>>()
+                })
+                .map(|found| {
+                    self.counts.found += usize::from(found.is_some());
+                    found.unwrap_or_default()
+                })
+                .collect(),
+            #[cfg(feature = "gpu")]
+            Taken::Device(device) => {
+                let effort = serde_json::to_vec(&device.measuring.effort).unwrap_or_default();
+                let keys: Vec<Option<[Key; 2]>> = (texts.iter())
+                    .map(|text| {
+                        text.as_ref()
+                            .map(|text| [key(text, b""), key(text, &effort)])
+                    })
+                    .collect();
+                device.take(texts, &keys, distance, &mut self.counts, &mut self.problems)
+            }
+        };
+        self.counts.missing += timings.iter().filter(|of| of.is_empty()).count();
+        timings
+    }
+
+    /// Times the text that holds all levels and branches by a uniform, at each level.
+    pub(super) fn branches(&mut self, base: &Shader, levels: &mut [Level], emitted: &[EmitLevel]) {
+        let output = Output {
+            form: Form::Uniform,
+            ..Output::default()
+        };
+        let Some(text) = emit::emit_as(self.source, base, emitted, output, "variant")
+            .ok()
+            .and_then(|files| {
+                let mut files = files.into_iter();
+                let (_, bytes) =
+                    files.find(|(name, _)| name.extension().is_some_and(|e| e == "wgsl"))?;
+                String::from_utf8(bytes).ok()
+            })
+        else {
+            return;
+        };
+        for level in levels {
+            if !level.timed.is_empty() {
+                let at = level.autolod;
+                let timed = self.take(&[Some((text.clone(), Some(at)))], level.distance);
+                level.branching = timed.into_iter().next().unwrap_or_default();
+            }
+        }
+    }
+
+    /// What should be known: levels whose gain the branch eats, and what could not be timed.
+    pub(super) fn warnings(&self, levels: &[Level]) -> Vec<Box<Diagnostic>> {
+        let mut warnings = Vec::new();
+        let eaten = levels.iter().enumerate().filter(|(_, level)| {
+            let pairs = level.timed.iter().zip(&level.branching);
+            let mut pairs = pairs.map(|(alone, branching)| (alone.verdict(), branching.verdict()));
+            pairs.any(|(alone, branching)| alone == Verdict::Faster && branching != Verdict::Faster)
+        });
+        let eaten: Vec<String> = eaten.map(|(at, _)| at.to_string()).collect();
+        if !eaten.is_empty() {
+            warnings.push(
+                Diagnostic::warning(format!(
+                    "the branch by a uniform eats what level {} gains",
+                    eaten.join(", ")
+                ))
+                .with_note("`--form override` and `--form files` have no branch left"),
+            );
+        }
+        let taken = |warning| {
+            let mut all = levels.iter().flat_map(|level| &level.timed);
+            all.any(|timing| timing.warnings.contains(&warning))
+        };
+        for (warning, says) in [
+            (
+                TimingWarning::ClockDrift,
+                "the clock of the adapter drifted while levels were timed",
+            ),
+            (
+                TimingWarning::FewSamples,
+                "the time for timing ran out before the intervals were as narrow as they should be",
+            ),
+            (
+                TimingWarning::SoftwareAdapter,
+                "times are those of a program on the CPU, and say nothing about a GPU",
+            ),
+            (
+                TimingWarning::TimerTooCoarse,
+                "the adapter's timer is too coarse for what was timed",
+            ),
+            (
+                TimingWarning::Throttled,
+                "the adapter got slower while levels were timed",
+            ),
+        ] {
+            if taken(warning) {
+                warnings.push(Diagnostic::warning(format!("{warning}: {says}")));
+            }
+        }
+        if let Some(problem) = self.problems.iter().next() {
+            let count = self.counts.missing;
+            warnings.push(
+                Diagnostic::warning(format!("{count} timings could not be taken: {problem}"))
+                    .with_note("what they are of was chosen by estimated times"),
+            );
+        } else if self.counts.missing > 0 && matches!(self.taken, Taken::Recordings(..)) {
+            let count = self.counts.missing;
+            warnings.push(
+                Diagnostic::warning(format!("{count} timings are not in the recordings"))
+                    .with_note("what they are of was chosen by estimated times; a recording fits the shader, the scene and the flags that it was made with"),
+            );
+        }
+        warnings
+    }
+
+    /// The recording of what was timed here, and where it is to be written.
+    pub(super) fn recording(&self) -> Option<(std::path::PathBuf, String)> {
+        match &self.taken {
+            #[cfg(feature = "gpu")]
+            Taken::Device(device) => {
+                let file = device.measuring.record.clone()?;
+                Some((file, device.recording.json()))
+            }
+            Taken::Recordings(..) => None,
+        }
+    }
+}
+
+impl Clock for Watch<'_> {
+    fn adapters(&self) -> &[String] {
+        &self.adapters
+    }
+
+    fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>> {
+        let mut texts = Vec::new();
+        for shader in variants {
+            let text = match shader.made().next().is_none() {
+                true => emit::variant(self.source, shader).map_err(|error| error.message.clone()),
+                false => Err("levels with textures that were made for them".to_owned()),
+            };
+            texts.push(match text {
+                Ok(text) => Some((text, None)),
+                Err(problem) => {
+                    self.problems.insert(problem);
+                    None
+                }
+            });
+        }
+        self.take(&texts, distance)
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl Device<'_> {
+    fn take(
+        &mut self,
+        texts: &[Option<Text>],
+        keys: &[Option<[Key; 2]>],
+        distance: f64,
+        counts: &mut Timings,
+        problems: &mut BTreeSet<String>,
+    ) -> Vec<Vec<Timing>> {
+        let mut timings: Vec<Option<Timing>> = Vec::new();
+        for key in keys {
+            let known = key.as_ref().and_then(|[short, whole]| {
+                let here = self.recording.timings.get(short).cloned();
+                here.or_else(|| self.cache.as_ref()?.get(whole))
+            });
+            counts.found += usize::from(known.is_some());
+            timings.push(known);
+        }
+        let missing: Vec<usize> = (0..texts.len())
+            .filter(|&at| timings[at].is_none() && texts[at].is_some())
+            .collect();
+        let variants: Vec<Variant> = (missing.iter())
+            .filter_map(|&at| texts[at].as_ref())
+            .map(|(text, auto_lod)| Variant {
+                text: Some(text.clone()),
+                auto_lod: *auto_lod,
+            })
+            .collect();
+        if !variants.is_empty() {
+            let effort = &self.measuring.effort;
+            match self.worker.time(&self.subject, &variants, distance, effort) {
+                Ok(taken) => {
+                    for (&at, taken) in missing.iter().zip(taken) {
+                        match taken {
+                            Ok(timing) => {
+                                counts.taken += 1;
+                                if let (Some(cache), Some([_, whole])) = (&self.cache, &keys[at])
+                                    && let Err(error) = cache.put(whole, &timing)
+                                {
+                                    problems.insert(format!(
+                                        "a timing cannot be kept in `{}`: {error}",
+                                        cache.folder().display()
+                                    ));
+                                    self.cache = None;
+                                }
+                                timings[at] = Some(timing);
+                            }
+                            Err(failure) => {
+                                let adapter = self.measuring.adapter.as_deref();
+                                problems.insert(failure.diagnostic(adapter).message);
+                            }
+                        }
+                    }
+                }
+                Err(failure) => {
+                    let error = failure.diagnostic(self.measuring.adapter.as_deref());
+                    problems.insert(error.message.clone());
+                }
+            }
+        }
+        for (key, timing) in keys.iter().zip(&timings) {
+            if let (Some([short, _]), Some(timing)) = (key, timing) {
+                let timings = &mut self.recording.timings;
+                timings
+                    .entry(short.clone())
+                    .or_insert_with(|| timing.clone());
+            }
+        }
+        timings
+            .into_iter()
+            .map(|timing| timing.into_iter().collect())
+            .collect()
+    }
+}
