@@ -4,6 +4,8 @@
 //! [`crate::emit::write_atomically`].
 
 #[cfg(feature = "search")]
+mod calibrate;
+#[cfg(feature = "search")]
 mod clock;
 #[cfg(feature = "search")]
 mod compare;
@@ -21,6 +23,8 @@ mod textures;
 mod transition;
 
 pub use crate::emit::Files;
+#[cfg(feature = "search")]
+pub use calibrate::{CalibrateRequest, Calibrated, Calibrating, calibrate};
 #[cfg(feature = "search")]
 pub use clock::Timings;
 #[cfg(feature = "search")]
@@ -121,6 +125,9 @@ pub struct Request {
     /// Where run times come from.
     #[cfg(feature = "search")]
     pub time: RunTime,
+    /// The calibration whose model ranks variants before they are timed; by default the estimate does.
+    #[cfg(feature = "search")]
+    pub model: Option<PathBuf>,
     /// What is never folded, simplified or left out: uniforms, textures, values, functions.
     pub keep: Vec<String>,
     /// The command that reproduces the result, for the report.

@@ -1,6 +1,7 @@
 //! The command line: arguments in, messages and an exit code out. All work is the library's.
 
 #[cfg(feature = "gpu")]
+mod calibrate;
 mod child;
 mod progress;
 
@@ -48,6 +49,8 @@ enum Command {
     Init(InitArgs),
     /// Writes one level of a lock as a shader of its own, and says what it needs bound
     Snapshot(SnapshotArgs),
+    /// Times variants of shaders on a GPU, and fits the cost model to it
+    Calibrate(calibrate::CalibrateArgs),
     /// Draws on the GPU for the process that started it
     #[cfg(feature = "gpu")]
     #[command(hide = true)]
@@ -282,6 +285,9 @@ struct TimeArgs {
     /// Writes all timings to a file, which stands in for the adapter with --recordings
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Ranks what is to be timed by the model that `lodc calibrate` wrote to a file [default: by the estimate]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// Takes times from files that --record has written, instead of an adapter; of several, for the adapter where a level does
     /// worst
     #[arg(long, value_name = "FILES", num_args = 1.., conflicts_with_all = ["time_budget", "no_cache", "record"])]
@@ -343,6 +349,7 @@ impl TimeArgs {
                 ("--time-budget", self.time_budget.is_some()),
                 ("--no-cache", self.no_cache),
                 ("--record", self.record.is_some()),
+                ("--model", self.model.is_some()),
                 #[cfg(feature = "gpu")]
                 ("--adapter", self.adapter.is_some()),
             ];
@@ -402,6 +409,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Some(Command::Calibrate(arguments)) => calibrate::run(arguments),
         #[cfg(feature = "gpu")]
         Some(Command::GpuWorker) => gpu_worker(),
         None => compile_command(cli.compile),
@@ -621,6 +629,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.goal = arguments.goal;
     request.only = arguments.only;
     request.command = command_line();
+    request.model = arguments.time.model.clone();
     request.time = arguments.time.run_time()?;
     let quiet = arguments.quiet;
     if arguments.locked {

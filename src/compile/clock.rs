@@ -10,6 +10,7 @@ use crate::emit::{self, EmitLevel, Form, Output};
 use crate::front::Source;
 use crate::search::Level;
 use crate::time::clock::Clock;
+use crate::time::model::{Calibration, Model};
 use crate::time::store::{Key, Recording};
 use crate::time::{Timing, TimingWarning, Verdict};
 use crate::{Diagnostic, Result};
@@ -29,6 +30,8 @@ pub(super) struct Watch<'a> {
     /// The hash of all that is drawn beside the variant.
     drawn: Key,
     adapters: Vec<String>,
+    /// What ranks variants before they are timed.
+    model: Model,
     taken: Taken<'a>,
     /// What was timed, and where it was found.
     pub(super) counts: Timings,
@@ -74,10 +77,15 @@ impl Ready {
         &'a self,
         request: &'a Request,
     ) -> Result<std::result::Result<Option<Watch<'a>>, Box<Diagnostic>>> {
+        let model = match &request.model {
+            Some(file) => Calibration::read(file)?.model,
+            None => Model::estimated(),
+        };
         let watch = |adapters, taken| Watch {
             source: &self.source,
             drawn: self.drawn(),
             adapters,
+            model,
             taken,
             counts: Timings::default(),
             problems: BTreeSet::new(),
@@ -297,6 +305,11 @@ impl Watch<'_> {
         warnings
     }
 
+    /// What could not be timed, and why, a line each.
+    pub(super) fn problems(&self) -> impl Iterator<Item = &String> {
+        self.problems.iter()
+    }
+
     /// The recording of what was timed here, and where it is to be written.
     pub(super) fn recording(&self) -> Option<(std::path::PathBuf, String)> {
         match &self.taken {
@@ -313,6 +326,10 @@ impl Watch<'_> {
 impl Clock for Watch<'_> {
     fn adapters(&self) -> &[String] {
         &self.adapters
+    }
+
+    fn model(&self) -> Model {
+        self.model.clone()
     }
 
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>> {

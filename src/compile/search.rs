@@ -137,7 +137,7 @@ fn as_scene_says(request: &Request, scene_file: Option<&Path>) -> Result<Request
 }
 
 impl Ready {
-    fn read(request: &Request) -> Result<Self> {
+    pub(super) fn read(request: &Request) -> Result<Self> {
         let read = Read::new(request)?;
         let scene = Scene::read(&read.source, read.scene_file.as_deref())?;
         Ok(read.ready(scene))

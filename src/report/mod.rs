@@ -3,10 +3,12 @@
 //! [`Report`] is the one source of both. What is not known is null, never left out, so that a program that
 //! reads it need not ask which version wrote it.
 
+mod calibration;
 mod comparison;
 mod exact;
 mod terminal;
 
+pub use calibration::calibration;
 pub use comparison::{ComparedAt, Comparison};
 pub use terminal::{inspection, next, summary, table};
 

@@ -11,10 +11,12 @@
 //! (a program on a CPU does one thing after the other), and a large one the longest alone. What a draw takes that does
 //! nothing comes on top.
 
+mod calibration;
 mod features;
 mod fit;
 mod judge;
 
+pub use calibration::{Calibration, Comparison, Measurement, Quality};
 pub use features::{Extent, Features, Invocation};
 pub use judge::{Judged, coefficient, he, judged, spearman};
 
