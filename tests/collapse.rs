@@ -145,6 +145,16 @@ fn expression(random: &mut Random, depth: u64) -> String {
 
 /// What a fragment stage returns at coordinates, each in a quad of its own.
 fn at(shader: &Shader, bindings: &Bindings, points: &[[f32; 2]]) -> Vec<[f32; 4]> {
+    in_layer(0, shader, bindings, points)
+}
+
+/// The same with a number at location 1.
+fn in_layer(
+    layer: u32,
+    shader: &Shader,
+    bindings: &Bindings,
+    points: &[[f32; 2]],
+) -> Vec<[f32; 4]> {
     let entry = shader.index(Stage::Fragment).expect("it has one");
     let program = Program::compile(shader.module(), entry, &[]).expect("it runs");
     let mut machine = Machine::new(&program, bindings);
@@ -153,6 +163,7 @@ fn at(shader: &Shader, bindings: &Bindings, points: &[[f32; 2]]) -> Vec<[f32; 4]
     for points in points.chunks(LANES / 4) {
         let inputs = program.inputs().iter().map(|slot| {
             std::array::from_fn(|lane| match slot.binding {
+                Binding::Location { location: 1, .. } => layer,
                 Binding::Location { .. } => {
                     let point = points[(lane / 4).min(points.len() - 1)];
                     point[slot.component].to_bits()
@@ -317,6 +328,63 @@ fn collapsed_expressions_are_the_original_texel_for_texel() {
     }
     assert!(collapsed > 80, "{collapsed}");
     assert_eq!(formats.len(), 3, "{formats:?}");
+}
+
+#[test]
+fn arrays_are_the_original_texel_for_texel_in_each_layer() {
+    const EDGE: u32 = 8;
+    const LAYERS: u32 = 3;
+    let source = "
+        @group(0) @binding(0) var t0: texture_2d_array<f32>;
+        @group(0) @binding(1) var t1: texture_2d_array<f32>;
+        @group(0) @binding(2) var t2: texture_2d<f32>;
+        @group(0) @binding(3) var s: sampler;
+        @fragment fn fs(@location(0) uv: vec2f, @location(1) @interpolate(flat) layer: i32) -> @location(0) vec4f {
+            let tiles = textureSample(t0, s, uv, layer) * textureSample(t1, s, uv, layer);
+            return tiles * textureSample(t2, s, uv) + 0.25 * textureSample(t1, s, uv, 2);
+        }";
+    let source = Source::parse("arrays.wgsl", source).unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).expect("it is small");
+    let mut random = Random(99);
+    let mut bindings = random_textures([EDGE; 3], Sampler::default());
+    for binding in 0..2 {
+        let images = (0..LAYERS).map(|_| Image {
+            width: EDGE,
+            height: EDGE,
+            texels: (0..EDGE * EDGE)
+                .map(|_| [0; 4].map(|_| random.below(256) as f32 / 255.0))
+                .collect(),
+        });
+        let texture = Texture::new(Dimension::D2, images.collect()).expect("it has texels");
+        let texture = Resource::Texture(Arc::new(texture.with_mip_chain()));
+        bindings.insert((0, binding), texture);
+    }
+    let offered = TextureCollapse.candidates(&base, &known_textures([EDGE; 3]));
+    let candidate = offered.iter().find(|c| c.choice.contains("fs.layer"));
+    let candidate = candidate.unwrap_or_else(|| panic!("{offered:?}"));
+    let variant = recipe::apply(&base, candidate).expect("it was offered");
+    variant.validate().unwrap_or_else(|e| panic!("{e:?}"));
+    let textures = GeneratedTextures::of(&variant).expect("it runs");
+    let baked = textures.baked(&bindings, &Store::default()).remove(0);
+    assert_eq!((baked.texture.layers(), baked.is_chain), (LAYERS, false));
+    let (extension, bytes) = baked.file().expect("it can be written");
+    let read = lodc::eval::generated::read("made.ktx2", &bytes).expect("it was written");
+    assert_eq!((extension, &read), ("ktx2", &*baked.texture));
+    let mut bound = bindings.clone();
+    textures.bind(&mut bound, &Store::default());
+    let centres =
+        (0..EDGE * EDGE).map(|i| [i % EDGE, i / EDGE].map(|x| (x as f32 + 0.5) / EDGE as f32));
+    let centres: Vec<[f32; 2]> = centres.collect();
+    // One below and one behind the last are clamped in both.
+    for layer in [0, 1, 2, 7, u32::MAX] {
+        let exact = in_layer(layer, &base, &bindings, &centres).into_iter();
+        let exact: Vec<[f32; 4]> = exact.map(|exact| baked.format.rounded(exact)).collect();
+        assert_eq!(
+            in_layer(layer, &variant, &bound, &centres),
+            exact,
+            "{layer}"
+        );
+    }
 }
 
 #[test]
@@ -564,6 +632,78 @@ fn textures_become_files_that_the_lock_makes_again() {
     fs::write(folder.join("silk.lod.toml"), other).expect("it can be written");
     let error = compile::locked(&request).expect_err("it is another");
     assert!(error.message.contains("is not what it was"), "{error}");
+}
+
+#[test]
+fn arrays_become_files_of_all_their_layers() {
+    let folder = folder("arrays");
+    let textures = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/textures");
+    let layers = |names: [&str; 3]| {
+        let paths = names.map(|name| format!("{:?}", textures.join(name).with_extension("png")));
+        paths.join(", ")
+    };
+    let shader = "
+        @group(0) @binding(0) var<uniform> camera: mat4x4f;
+        @group(0) @binding(1) var smooth_sampler: sampler;
+        @group(0) @binding(2) var tiles: texture_2d_array<f32>;
+        @group(0) @binding(3) var shades: texture_2d_array<f32>;
+        struct Surface { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
+        @vertex fn vs(@location(0) position: vec3f, @location(2) uv: vec2f) -> Surface {
+            return Surface(camera * vec4f(position, 1.0), uv);
+        }
+        @fragment fn fs(in: Surface) -> @location(0) vec4f {
+            let tile = u32(3.0 * in.uv.y);
+            let tinted = textureSample(tiles, smooth_sampler, in.uv, tile) * textureSample(shades, smooth_sampler, in.uv, tile);
+            return vec4f(sqrt(tinted.rgb), 1.0);
+        }";
+    let scene = format!(
+        "object = \"plane\"\nresolution = [48, 48]\nlevels = 3\nviews = {{ directions = [[0, 0.4, 1]] }}
+         [distance]\nnearest = 2.5\nfarthest = 20
+         [uniforms]\ncamera = \"model-view-projection\"
+         [textures]\ntiles = {{ layers = [{}] }}\nshades = {{ layers = [{}] }}\n",
+        layers(["hide_albedo", "cliff_albedo", "grass_albedo"]),
+        layers(["grime", "rock_albedo", "panel_albedo"])
+    );
+    fs::write(folder.join("tiles.wgsl"), shader).expect("it can be written");
+    fs::write(folder.join("tiles.toml"), scene).expect("it can be written");
+    let request = Request {
+        shader: folder.join("tiles.wgsl"),
+        textures: true,
+        ..Request::default()
+    };
+    let compiled = compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    write_atomically(&compiled.files).expect("they can be written");
+    let made = &compiled.report.generated;
+    assert!(
+        matches!(&made[..], [made] if made.layers == Some(3) && made.file.ends_with(".ktx2")),
+        "{made:?}"
+    );
+    let (files, _) = compile::locked(&request).unwrap_or_else(|e| panic!("{e}"));
+    for (file, bytes) in &files {
+        assert_eq!(
+            &fs::read(file).expect("it was written"),
+            bytes,
+            "{}",
+            file.display()
+        );
+    }
+    let compared = compile::compare(
+        &CompareRequest {
+            original: request.clone(),
+            other: folder.join("tiles.lod.wgsl"),
+            ..CompareRequest::default()
+        },
+        &|| {},
+    );
+    let compared = compared.unwrap_or_else(|e| panic!("{e}"));
+    for level in &compiled.report.levels {
+        let mut at = compared.comparison.distances.iter();
+        let at = at.find(|at| at.distance == level.distance);
+        let off = at.expect("a level starts there").error.rmse - level.error.rmse;
+        assert!(off.abs() < 1e-6, "{off}");
+    }
+    #[cfg(feature = "gpu")]
+    drawn_by_a_gpu(&request, &compared.comparison);
 }
 
 /// Holds a device's figures of the emitted shader, with its textures, against the evaluator's.

@@ -12,7 +12,7 @@
 //! // facts: texture albedo dynamic                      or flat: one colour everywhere
 //! // facts: fixed material.flags 5                     stated by the scene; a float has a point
 //! // facts: texture bumps slopes 0.25 0.125             a map of normals: the variance along both axes, level by level
-//! // facts: texture dust size 64                        texels along each edge; 16 otherwise
+//! // facts: texture dust size 64                        texels along each edge, or layers; 16 and 4 otherwise
 //! // facts: sampler tiled repeats                       along both axes
 //! // in turn: fs_main.diffuse_3 fs_main.specular_3     only what the first candidates of these make, one after the other
 //! // facts: texture sky harmonics 1                     smooth: near such a sum, of 0.5, 0.25, 0.125 and so on
@@ -195,6 +195,13 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                 texture
                     .zip(edge)
                     .map(|(texture, edge)| texture.size = [edge; 2])
+            }
+            ["texture", name, "layers", count] => {
+                let texture = facts.textures.get_mut(name);
+                let count = count.parse().ok();
+                texture
+                    .zip(count)
+                    .map(|(texture, count)| texture.layers = count)
             }
             ["sampler", name, "repeats"] => {
                 facts.repeating.insert(name.into());

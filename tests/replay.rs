@@ -8,7 +8,7 @@ mod synthetic;
 
 use lodc::front::Source;
 use lodc_passes::recipe::{self, Candidate, Declined, Recipe};
-use lodc_passes::{Facts, Pass, Shader, Stage, all_passes, specialize};
+use lodc_passes::{Facts, Generated, Pass, Shader, Stage, all_passes, specialize};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use similar::TextDiff;
 use std::path::Path;
@@ -297,6 +297,12 @@ fn independent(edits: [&Candidate; 2], alone: [&Shader; 2], one: &Shader, other:
         .iter()
         .any(|edit| specialize::branched(edit).is_some())
     {
+        return false;
+    }
+    // What has gone into a texture is not removed from it any more.
+    let made = |shader: &Shader| -> Vec<_> { shader.made().map(Generated::definition).collect() };
+    let is_removal = |edit: &&Candidate| edit.pass == "texture-removal";
+    if edits.iter().any(is_removal) && made(one) != made(other) {
         return false;
     }
     let of_vertices = |shader: &Shader| shader.stage_fingerprint(Stage::Vertex);

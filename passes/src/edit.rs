@@ -261,6 +261,12 @@ impl<'a> Edit<'a> {
         self.replaced.insert(old, new);
     }
 
+    /// An old value is computed so from now on, where it was: of old values that are there by then, and of added ones. It
+    /// has the type that it had.
+    pub(crate) fn rewrite(&mut self, value: Handle<Expression>, expression: Expression) {
+        self.expressions[value] = expression;
+    }
+
     /// From now on `user`, and no other, uses the replacement where it used `old`. It goes before
     /// [`replace`](Self::replace), and applies to added users too.
     pub fn replace_operand(&mut self, user: User, old: Handle<Expression>, new: New) {

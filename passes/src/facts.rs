@@ -228,6 +228,8 @@ pub struct Fit {
 pub struct TextureFacts {
     /// Width and height of its finest level in texels.
     pub size: [u32; 2],
+    /// How many layers it has, 1 where it is no array.
+    pub layers: u32,
     /// The mean over the whole texture at each MIP level, finest first; where its alpha is what is seen of the
     /// others, those are weighed by it.
     pub mean: Vec<[f32; 4]>,

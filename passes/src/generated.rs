@@ -14,7 +14,7 @@ use naga::{Expression, GlobalVariable, Handle};
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-/// The location at which a bake takes the coordinates of a texel; the level of each read follows.
+/// The location at which a bake takes the coordinates of a texel; the level of each read follows, and the layer.
 pub const COORDINATES: u32 = 0;
 
 /// A texture that a pass has made.
@@ -24,8 +24,11 @@ pub struct Generated {
     pub binding: (u32, u32),
     /// Whether it is a cube map, so that its coordinates are a direction.
     pub is_cube: bool,
+    /// Whether it is an array, with as many layers as the arrays among its sources that are read in the same layer.
+    pub is_array: bool,
     /// A shader whose fragment stage returns a texel at location 0 as a vector of four. Its inputs are the coordinates at
-    /// location [`COORDINATES`], and behind that a float for each of `reads`: the MIP level that it reads.
+    /// location [`COORDINATES`], behind that a float for each of `reads`, the MIP level that it reads, and behind these the
+    /// layer, an integer, of an array.
     pub bake: Arc<Shader>,
     /// The samples in the bake.
     pub reads: Vec<Read>,
@@ -43,6 +46,8 @@ pub struct Read {
     pub binding: (u32, u32),
     /// How often the texture repeats along each axis, over the part of it that is baked.
     pub repeats: [f32; 2],
+    /// Whether it is an array that is read in the layer of the texel.
+    pub is_layered: bool,
 }
 
 impl Generated {

@@ -51,6 +51,7 @@ pub(super) fn make(scene: &Scene, textures: &[GeneratedTexture]) -> Result<Vec<M
                 hash: front::hash(&bytes),
                 format: baked.format.name().into(),
                 size: [width, height],
+                layers: texture.generated.is_array.then(|| baked.texture.layers()),
                 levels: baked.texture.level_count(),
             };
             Ok(Made { locked, bytes })

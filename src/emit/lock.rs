@@ -116,6 +116,9 @@ pub struct LockedGenerated {
     pub format: String,
     /// Width and height in texels.
     pub size: [u32; 2],
+    /// How many layers it has, of an array.
+    #[serde(default)]
+    pub layers: Option<u32>,
     /// How many MIP levels it has.
     pub levels: u32,
 }
@@ -246,8 +249,10 @@ impl Lock {
             line("generated = [".to_owned());
             for texture in &self.generated {
                 let [width, height] = texture.size;
+                let layers = texture.layers.map(|count| format!(" layers = {count},"));
+                let layers = layers.unwrap_or_default();
                 line(format!(
-                    "  {{ name = {}, file = {}, hash = {}, format = {}, size = [{width}, {height}], levels = {} }},",
+                    "  {{ name = {}, file = {}, hash = {}, format = {}, size = [{width}, {height}],{layers} levels = {} }},",
                     string(&texture.name),
                     string(&texture.file),
                     string(&texture.hash),
@@ -721,6 +726,7 @@ mod tests {
                 hash: hash(b"made"),
                 format: "rgba8unorm".into(),
                 size: [256, 128],
+                layers: Some(3),
                 levels: 9,
             }],
             output: Output {

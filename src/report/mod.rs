@@ -70,6 +70,8 @@ pub struct GeneratedReport {
     pub format: String,
     /// Width and height in texels.
     pub size: [u32; 2],
+    /// How many layers it has; null where it is no array.
+    pub layers: Option<u32>,
     /// How many MIP levels it has.
     pub levels: u32,
     /// The hash of the file.
@@ -83,6 +85,7 @@ impl From<LockedGenerated> for GeneratedReport {
             file: locked.file,
             format: locked.format,
             size: locked.size,
+            layers: locked.layers,
             levels: locked.levels,
             hash: locked.hash,
         }

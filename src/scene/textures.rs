@@ -277,7 +277,7 @@ pub(super) fn resolve(
             let file = file.display().to_string();
             found.inputs.push((file.clone(), hash(&bytes)));
             let texture = generated::read(&file, &bytes)?;
-            if texture.dimension() != kind.dimension {
+            if texture.dimension() != kind.dimension || (texture.layers() > 1 && !kind.arrayed) {
                 return Err(Diagnostic::error(format!(
                     "`{file}` is no image for the texture `{name}`"
                 ))

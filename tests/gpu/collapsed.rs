@@ -25,7 +25,7 @@ struct Fixture {
     choice: &'static str,
 }
 
-const FIXTURES: [Fixture; 5] = [
+const FIXTURES: [Fixture; 7] = [
     Fixture {
         name: "levels",
         declared: "@group(0) @binding(3) var hide: texture_2d<f32>; @group(0) @binding(4) var grime: texture_2d<f32>;",
@@ -52,6 +52,20 @@ const FIXTURES: [Fixture; 5] = [
         declared: "@group(0) @binding(3) var sky: texture_cube<f32>;",
         value: "sqrt(textureSample(sky, smooth_sampler, normalize(in.normal)))",
         images: "sky = { faces = [\"studio_px\", \"studio_nx\", \"studio_py\", \"studio_ny\", \"studio_pz\", \"studio_nz\"] }",
+        choice: "levels ",
+    },
+    Fixture {
+        name: "array",
+        declared: "@group(0) @binding(3) var tiles: texture_2d_array<f32>; @group(0) @binding(4) var shades: texture_2d_array<f32>;",
+        value: "textureSample(tiles, smooth_sampler, in.uv, u32(3.0 * in.uv.y)) * textureSample(shades, smooth_sampler, in.uv, u32(3.0 * in.uv.y))",
+        images: "tiles = { layers = [\"hide_albedo\", \"cliff_albedo\", \"grass_albedo\"] }\nshades = { layers = [\"grime\", \"rock_albedo\", \"panel_albedo\"] }",
+        choice: "levels ",
+    },
+    Fixture {
+        name: "layer",
+        declared: "@group(0) @binding(3) var tiles: texture_2d_array<f32>;",
+        value: "textureSample(tiles, smooth_sampler, in.uv, 2) * textureSample(tiles, smooth_sampler, in.uv, 1)",
+        images: "tiles = { layers = [\"hide_albedo\", \"cliff_albedo\", \"grass_albedo\"] }",
         choice: "levels ",
     },
     Fixture {

@@ -62,6 +62,7 @@ pub(crate) fn facts(shader: &Shader) -> Facts {
                 name.clone(),
                 TextureFacts {
                     size: [16; 2],
+                    layers: 4,
                     mean: vec![[0.5, 0.25, 0.75, 1.0]; 3],
                     deviation: vec![
                         [0.25, 0.25, 0.25, 0.0],

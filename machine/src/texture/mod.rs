@@ -268,6 +268,7 @@ impl Texture {
         let [width, height, _] = self.size(0);
         TextureFacts {
             size: [width, height],
+            layers: self.layers(),
             mean,
             deviation,
             level,

@@ -3,7 +3,8 @@
 //! Precondition. The site is a float or a vector of them of the fragment stage that is computed of samples of known
 //! textures and of constants alone. All samples have the same sampler and choose their level of detail in the same way, at
 //! coordinates that the candidate names, its root, or at ones that repeat a whole number of times when the root goes
-//! from 0 to 1.
+//! from 0 to 1. Samples of arrays are in a constant layer, or in one that all have in common and the candidate names behind
+//! all else: then the new texture is an array too, each layer made of those of the sources.
 //!
 //! Effect. One of the samples that nothing else needs reads the new texture at the root instead, and the site is what it
 //! returns. The texture is bound at the first free binding of the group of the textures that went into it. How its texels
@@ -27,6 +28,7 @@
 //!
 //! Declines.
 //! - A texture that the facts do not know, because it may hold anything, and one that has another image in each draw.
+//! - Arrays in different layers, or with different numbers of layers.
 //! - Coordinates without a common period, or with one that would take more than 4096 texels along an edge.
 //! - What is in a branch that may be there for a hole in its domain, and what each round of a loop computes anew.
 //! - Where other users still need all of the samples, so that there would be one more.
@@ -50,6 +52,7 @@ use crate::{Facts, Work};
 use naga::{Expression, SampleLevel};
 use plan::{MOST_EDGE, MOST_RESAMPLED, Plan, is_operation};
 use seen::{Of, Sample, sample, seen_from};
+use std::fmt;
 
 /// The stage whose samples are collapsed.
 const STAGE: Stage = Stage::Fragment;
@@ -59,6 +62,9 @@ pub const MOST_TEXTURES: usize = 16;
 
 /// The pass.
 pub struct TextureCollapse;
+
+/// What makes texels of values: coordinates, and what chooses a layer of arrays.
+type Root = (Value, Option<Value>);
 
 /// How a value is collapsed: the words of this pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,27 +86,51 @@ impl Kind {
             Self::Bake(_) => "bake",
         }
     }
+}
 
-    /// The choice of this kind, with the id of a root.
-    fn choice(self, root: &ValueId) -> String {
-        match self {
-            Self::Resampled(edge) | Self::Bake(edge) => format!("{} {root} {edge}", self.word()),
-            _ => format!("{} {root}", self.word()),
-        }
-    }
+/// A choice, read: the kind, and the ids of values.
+struct Choice {
+    kind: Kind,
+    root: ValueId,
+    /// Of an array.
+    layer: Option<ValueId>,
+}
 
-    /// A choice: the kind, and the id of the root behind it.
-    fn parse(choice: &str) -> Result<(Self, ValueId), Declined> {
+impl Choice {
+    fn parse(choice: &str) -> Result<Self, Declined> {
+        let number = |edge: &str| edge.parse().ok();
         let words: Vec<&str> = choice.split(' ').collect();
-        let kind = match words[..] {
-            ["same", root] => Some((Self::Same, root)),
-            ["levels", root] => Some((Self::Levels, root)),
-            ["resampled", root, edge] => edge.parse().ok().map(|e| (Self::Resampled(e), root)),
-            ["bake", root, edge] => edge.parse().ok().map(|edge| (Self::Bake(edge), root)),
+        let read = match words[..] {
+            ["same", root, ref rest @ ..] => Some((Kind::Same, root, rest)),
+            ["levels", root, ref rest @ ..] => Some((Kind::Levels, root, rest)),
+            ["resampled", root, edge, ref rest @ ..] => {
+                number(edge).map(|edge| (Kind::Resampled(edge), root, rest))
+            }
+            ["bake", root, edge] => number(edge).map(|edge| (Kind::Bake(edge), root, &[][..])),
             _ => None,
         };
-        kind.map(|(kind, root)| (kind, ValueId::from(root)))
-            .ok_or_else(|| Declined(format!("texture-collapse has no choice `{choice}`")))
+        let (kind, root, rest) = read
+            .filter(|(_, _, rest)| rest.len() < 2)
+            .ok_or_else(|| Declined(format!("texture-collapse has no choice `{choice}`")))?;
+        Ok(Self {
+            kind,
+            root: ValueId::from(root),
+            layer: rest.first().map(|layer| ValueId::from(*layer)),
+        })
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, root, layer } = self;
+        write!(f, "{} {root}", kind.word())?;
+        if let Kind::Resampled(edge) | Kind::Bake(edge) = kind {
+            write!(f, " {edge}")?;
+        }
+        match layer {
+            Some(layer) => write!(f, " {layer}"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -114,10 +144,10 @@ impl Pass for TextureCollapse {
     }
 
     fn class(&self, candidate: &Candidate) -> Class {
-        match Kind::parse(&candidate.choice) {
-            Ok((Kind::Same, _)) => Class::Lossless,
-            Ok((Kind::Levels | Kind::Resampled(_), _)) => Class::ResolutionLossless,
-            Ok((Kind::Bake(_), _)) | Err(_) => Class::Lossy,
+        match Choice::parse(&candidate.choice).map(|choice| choice.kind) {
+            Ok(Kind::Same) => Class::Lossless,
+            Ok(Kind::Levels | Kind::Resampled(_)) => Class::ResolutionLossless,
+            Ok(Kind::Bake(_)) | Err(_) => Class::Lossy,
         }
     }
 
@@ -145,8 +175,8 @@ impl Pass for TextureCollapse {
 
 /// Whether all samples of a candidate are at its root, so that each texel of the new texture is one of the sources'.
 pub fn is_texel_by_texel(candidate: &Candidate) -> bool {
-    let kind = Kind::parse(&candidate.choice);
-    candidate.pass == TextureCollapse.name() && matches!(kind, Ok((Kind::Same | Kind::Levels, _)))
+    let kind = Choice::parse(&candidate.choice).map(|choice| choice.kind);
+    candidate.pass == TextureCollapse.name() && matches!(kind, Ok(Kind::Same | Kind::Levels))
 }
 
 fn stage<'a>(shader: &'a Shader, candidate: &Candidate) -> Result<Flow<'a>, Declined> {
@@ -174,25 +204,33 @@ fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
     let mut sampled: Vec<Value> = reads.iter().map(|(_, read)| read.coordinate).collect();
     sampled.sort_unstable();
     sampled.dedup();
+    let mut layers: Vec<Value> = reads.iter().filter_map(|(_, read)| read.layer).collect();
+    layers.sort_unstable();
+    layers.dedup();
     let mut found: Vec<(Value, Considered)> = Vec::new();
-    // For each value, the root that makes texels of it.
-    let mut root_of: Vec<Option<Value>> = vec![None; values.len()];
+    // For each value, the root and the layer that make texels of it.
+    let mut root_of: Vec<Option<Root>> = vec![None; values.len()];
+    // A larger period is for what has no smaller one, and an array for what needs more than a layer.
     let periods = periods(flow, &sampled);
-    for root in sampled.into_iter().chain(periods) {
-        let of = seen_from(flow, root);
+    let flat = sampled.iter().chain(&periods).map(|root| (*root, None));
+    let layered = layers.iter().flat_map(|layer| {
+        let roots = sampled.iter().chain(&periods);
+        roots.map(|root| (*root, Some(*layer)))
+    });
+    let first = sampled.len();
+    for (at, (root, layer)) in flat.chain(layered).enumerate() {
+        let of = seen_from(flow, root, layer);
         let is_texels = |value: Value| matches!(of[value.index()], Of::Texels { .. });
         let before = root_of.clone();
         for &value in values.iter().filter(|value| is_texels(**value)) {
-            root_of[value.index()].get_or_insert(root);
+            root_of[value.index()].get_or_insert((root, layer));
         }
-        let is_sampled = reads.iter().any(|(_, read)| read.coordinate == root);
         for site in largest(flow, &of, |of| matches!(of, Of::Texels { .. })) {
-            // A larger period is for what has no smaller one.
-            if !is_sampled && before[site.index()].is_some() {
+            if at >= first && before[site.index()].is_some() {
                 continue;
             }
-            let choices = match Plan::new(flow, (site, root), &of) {
-                Ok(plan) => choices(flow, (&plan, root), facts),
+            let choices = match Plan::new(flow, site, (root, layer), &of) {
+                Ok(plan) => choices(flow, &plan, facts),
                 // A sample that nothing is done to is not worth a word.
                 Err(_) if sample(flow, site).is_some() => Vec::new(),
                 Err(why) => vec![(Kind::Same.word().to_owned(), Some(why))],
@@ -212,22 +250,18 @@ fn consider(flow: &Flow, facts: &Facts) -> Vec<Considered> {
 }
 
 /// What a plan may be, each as its choice, or why not.
-fn choices(
-    flow: &Flow,
-    (plan, root): (&Plan<'_>, Value),
-    facts: &Facts,
-) -> Vec<(String, Option<Declined>)> {
+fn choices(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Vec<(String, Option<Declined>)> {
     let kinds = known(flow, plan, facts).and_then(|()| match plan.kind {
         // Between the texels of the finer one, the coarser ones have bends.
         Kind::Same if !are_as_large(flow, plan, facts) => Ok(vec![Kind::Levels]),
-        Kind::Resampled(_) => resolutions(flow, (plan, root), facts),
+        Kind::Resampled(_) => resolutions(flow, plan, facts),
         kind => Ok(vec![kind]),
     });
     match kinds {
         Ok(kinds) => {
             let kinds = kinds.into_iter();
             kinds
-                .map(|kind| (kind.choice(flow.id(root)), None))
+                .map(|kind| (plan.choice(flow, kind).to_string(), None))
                 .collect()
         }
         Err(why) => vec![(plan.kind.word().to_owned(), Some(why))],
@@ -236,11 +270,7 @@ fn choices(
 
 /// What a resampled texture's longest edge may have at most: a texel for a pixel, where it is known how large the period is
 /// on the screen, and all that its sources have.
-fn resolutions(
-    flow: &Flow,
-    (plan, root): (&Plan<'_>, Value),
-    facts: &Facts,
-) -> Result<Vec<Kind>, Declined> {
+fn resolutions(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<Vec<Kind>, Declined> {
     let whole = plan
         .textures(flow)
         .zip(&plan.repeats)
@@ -255,7 +285,7 @@ fn resolutions(
             })
         });
     let whole = whole.fold(1.0, f32::max).ceil() as u32;
-    let fits = pixels_along(flow, root, facts).map_or(whole, |pixels| {
+    let fits = pixels_along(flow, plan.root, facts).map_or(whole, |pixels| {
         let pixels = pixels.clamp(1.0, MOST_RESAMPLED as f32) as u32;
         pixels.next_power_of_two().max(LEAST_EDGE)
     });
@@ -277,7 +307,7 @@ fn resolutions(
 fn pixels_along(flow: &Flow, root: Value, facts: &Facts) -> Option<f32> {
     let pixels = facts.pixels_per_coordinate?;
     inputs(flow).find_map(|input| {
-        let Of::Affine(rows) = &seen_from(flow, input)[root.index()] else {
+        let Of::Affine(rows) = &seen_from(flow, input, None)[root.index()] else {
             return None;
         };
         let [[a, b, _], [c, d, _]] = rows[..] else {
@@ -399,6 +429,16 @@ fn known(flow: &Flow, plan: &Plan<'_>, facts: &Facts) -> Result<(), Declined> {
         let why = "a level of detail that is given means another size in each of its textures";
         return Err(Declined(why.into()));
     }
+    let mut layers = plan
+        .layered(flow)
+        .filter_map(|name| facts.textures.get(name))
+        .map(|texture| texture.layers);
+    let first = layers.next();
+    if layers.any(|layers| Some(layers) != first) {
+        return Err(Declined(
+            "its arrays differ in how many layers they have".into(),
+        ));
+    }
     if let Kind::Resampled(_) = plan.kind {
         let sampler = plan
             .samples
@@ -434,7 +474,7 @@ fn has_room(flow: &Flow, plan: &Plan<'_>) -> Result<(), Declined> {
 }
 
 /// Values of samples that are at unrelated coordinates.
-fn apart(flow: &Flow, root_of: &[Option<Value>]) -> Vec<(Value, Considered)> {
+fn apart(flow: &Flow, root_of: &[Option<Root>]) -> Vec<(Value, Considered)> {
     let values = flow.function.expressions.iter().map(|(value, _)| value);
     values
         .filter(|value| root_of[value.index()].is_none() && flow.floats(*value).is_some())
@@ -449,7 +489,12 @@ fn apart(flow: &Flow, root_of: &[Option<Value>]) -> Vec<(Value, Considered)> {
             });
             roots.sort_unstable();
             roots.dedup();
-            let why = "its textures are read at coordinates without a common period";
+            let mut coordinates = roots.iter().map(|(root, _)| root);
+            let first = coordinates.next();
+            let why = match coordinates.all(|other| Some(other) == first) {
+                true => "its textures are read in different layers",
+                false => "its textures are read at coordinates without a common period",
+            };
             (roots.len() > 1 && !others).then(|| {
                 let declined = Some(Declined(why.into()));
                 (
@@ -470,7 +515,7 @@ fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
     let works: Vec<Work> = cost::of_expressions(flow.module, &flow.function.expressions, &types);
     let mut found = Vec::new();
     for root in inputs(flow) {
-        let of = seen_from(flow, root);
+        let of = seen_from(flow, root, None);
         for site in largest(flow, &of, |of| *of == Of::Function) {
             let edge = facts.pixels_per_coordinate.map_or(LEAST_EDGE, |pixels| {
                 let pixels = pixels.clamp(1.0, MOST_EDGE as f32) as u32;
@@ -484,9 +529,9 @@ fn procedural(flow: &Flow, facts: &Facts) -> Vec<(Value, Considered)> {
             if !is_worth_it {
                 continue;
             }
-            match plan.and_then(|plan| may_be_baked(flow, (&plan, root), facts)) {
-                Ok(()) => found.extend([edge, edge / 2].map(|edge| {
-                    let choice = Kind::Bake(edge).choice(flow.id(root));
+            match plan.and_then(|plan| may_be_baked(flow, (&plan, root), facts).map(|()| plan)) {
+                Ok(plan) => found.extend([edge, edge / 2].map(|edge| {
+                    let choice = plan.choice(flow, Kind::Bake(edge)).to_string();
                     (site, candidate(flow, site, choice, None))
                 })),
                 Err(why) => {

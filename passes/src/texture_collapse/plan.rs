@@ -1,7 +1,7 @@
 //! Plans: what a collapse reads, what reads the new texture, and what computes its texels.
 
 use super::seen::{Of, Sample, repeats, sample, seen_from};
-use super::{Kind, STAGE, find};
+use super::{Choice, Kind, STAGE, find};
 use crate::Work;
 use crate::edit::{Edit, New, part};
 use crate::flow::{Flow, Value};
@@ -31,7 +31,9 @@ pub(super) const MOST_RESAMPLED: u32 = 4096;
 /// A collapse that can be made.
 pub(super) struct Plan<'a> {
     site: Value,
-    root: Value,
+    pub(super) root: Value,
+    /// What chooses the layer of the new texture, where that is an array.
+    layer: Option<Value>,
     pub(super) kind: Kind,
     slice: Slice<'a>,
     /// The samples in the slice, in the order of the function.
@@ -47,14 +49,18 @@ impl<'a> Plan<'a> {
         flow: &'a Flow<'a>,
         candidate: &Candidate,
     ) -> Result<Self, Declined> {
-        let (kind, root) = Kind::parse(&candidate.choice)?;
+        let Choice { kind, root, layer } = Choice::parse(&candidate.choice)?;
         let site = find(flow, &candidate.site)?;
         let root = find(flow, &root)?;
-        let of = seen_from(flow, root);
+        let layer = layer.map(|layer| find(flow, &layer)).transpose()?;
+        let of = seen_from(flow, root, layer);
         let plan = match kind {
             Kind::Bake(edge) => Self::procedural(flow, (site, root), &of, edge)?,
-            _ => Self::new(flow, (site, root), &of)?,
+            _ => Self::new(flow, site, (root, layer), &of)?,
         };
+        if plan.layer != layer {
+            return Err(Declined("it is in no such layer".into()));
+        }
         match (kind, plan.kind) {
             // Textures that differ in size: it does the same, and promises less.
             (Kind::Levels, Kind::Same) => Ok(Self { kind, ..plan }),
@@ -71,7 +77,8 @@ impl<'a> Plan<'a> {
 
     pub(super) fn new(
         flow: &'a Flow<'a>,
-        (site, root): (Value, Value),
+        site: Value,
+        (root, layer): (Value, Option<Value>),
         of: &[Of],
     ) -> Result<Self, Declined> {
         let no = |why: &str| Err(Declined(why.into()));
@@ -81,7 +88,7 @@ impl<'a> Plan<'a> {
         if flow.floats(site).is_none() {
             return no("it is no float, or vector of floats");
         }
-        let Some(slice) = known_slice(flow, (site, root), of) else {
+        let Some(slice) = known_slice(flow, site, (root, layer), of) else {
             return no("what ends a loop in it is more than texels and constants");
         };
         let around = slice.around();
@@ -126,11 +133,17 @@ impl<'a> Plan<'a> {
                 _ => [1.0; 2],
             });
         }
+        let layer = layer.filter(|layer| {
+            let mut layers = samples.iter().map(|(_, read)| read.layer);
+            layers.any(|of| of == Some(*layer))
+        });
         let unneeded = unneeded(flow, &slice, site);
         let places = flow.shader.places(STAGE);
         let mut free = samples.iter().filter(|(value, read)| {
-            let reads_root = read.coordinate == root || places.reaches(root, User::Value(*value));
-            unneeded[value.index()] && reads_root
+            let reaches = |operand: Value| places.reaches(operand, User::Value(*value));
+            let reads_root = read.coordinate == root || reaches(root);
+            let reads_layer = read.layer == layer || layer.is_none_or(reaches);
+            unneeded[value.index()] && reads_root && reads_layer
         });
         let edit = Edit::new(flow.shader, STAGE);
         let Some((carrier, _)) = free.find(|(value, _)| edit.available(site, *value)) else {
@@ -139,6 +152,7 @@ impl<'a> Plan<'a> {
         Ok(Self {
             site,
             root,
+            layer,
             kind: match (at_root, linear) {
                 (true, true) => Kind::Same,
                 (true, false) => Kind::Levels,
@@ -168,7 +182,7 @@ impl<'a> Plan<'a> {
         if !(1..=MOST_EDGE).contains(&edge) {
             return no("no texture has such an edge");
         }
-        let Some(slice) = known_slice(flow, (site, root), of) else {
+        let Some(slice) = known_slice(flow, site, (root, None), of) else {
             return no("what ends a loop in it is more than texture coordinates and constants");
         };
         if !slice.around().is_empty() || !is_outermost(flow, site) {
@@ -180,12 +194,22 @@ impl<'a> Plan<'a> {
         Ok(Self {
             site,
             root,
+            layer: None,
             kind: Kind::Bake(edge),
             slice,
             samples: Vec::new(),
             carrier: None,
             repeats: Vec::new(),
         })
+    }
+
+    /// The choice that makes it so.
+    pub(super) fn choice(&self, flow: &Flow, kind: Kind) -> Choice {
+        Choice {
+            kind,
+            root: flow.id(self.root).clone(),
+            layer: self.layer.map(|layer| flow.id(layer).clone()),
+        }
     }
 
     /// The work that the texture saves, in full-rate operations; endless where rounds of a loop are in it.
@@ -204,6 +228,14 @@ impl<'a> Plan<'a> {
             .iter()
             .filter_map(|(_, read)| flow.global(read.image));
         images.filter_map(|image| flow.module.global_variables[image].name.as_deref())
+    }
+
+    /// The names of those that are arrays, read in the layer of the new one.
+    pub(super) fn layered<'f>(&'f self, flow: &'f Flow<'_>) -> impl Iterator<Item = &'f str> {
+        let is_layered = self.samples.iter().map(|(_, read)| read.layer);
+        let is_layered = is_layered.map(|layer| layer.is_some() && layer == self.layer);
+        let all = self.textures(flow).zip(is_layered);
+        all.filter_map(|(name, is_layered)| is_layered.then_some(name))
     }
 
     /// The shader with the collapse made.
@@ -227,6 +259,7 @@ impl<'a> Plan<'a> {
         let generated = Generated {
             binding,
             is_cube: flow.floats(self.root) == Some(3),
+            is_array: self.layer.is_some(),
             bake: Arc::new(self.bake(flow, components)),
             reads: self.reads(flow),
             edge: match self.kind {
@@ -235,7 +268,10 @@ impl<'a> Plan<'a> {
             },
             components,
         };
-        let name = self.name(flow);
+        // The same texture is not made twice.
+        let before = made_before(flow, &generated);
+        let name = before.and_then(|before| flow.module.global_variables[before].name.clone());
+        let name = name.unwrap_or_else(|| self.name(flow));
         let path = flow.id(self.site).path();
         let entry = path.split('.').next().unwrap_or(path);
 
@@ -245,28 +281,35 @@ impl<'a> Plan<'a> {
                 true => ImageDimension::Cube,
                 false => ImageDimension::D2,
             },
-            arrayed: false,
+            arrayed: generated.is_array,
             class: ImageClass::Sampled {
                 kind: ScalarKind::Float,
                 multi: false,
             },
         };
-        let variable = edit.add_texture(name.clone(), ty, generated);
+        let variable = match before {
+            Some(variable) => variable,
+            None => edit.add_texture(name.clone(), ty, generated),
+        };
         let image = edit.add(
             format!("{entry}.{name}"),
             Expression::GlobalVariable(variable),
         );
-        let own = self.samples.iter();
-        let mut own = own.filter(|(value, _)| Some(*value) == self.carrier);
-        let carrier = match own.next() {
-            Some((carrier, own)) => {
-                let user = User::Value(*carrier);
-                edit.rename(*carrier, format!("{path}.texel"));
-                edit.replace_operand(user, own.image, New::Value(image));
-                if own.coordinate != self.root {
-                    edit.replace_operand(user, own.coordinate, New::Value(self.root));
+        let carrier = match self.carrier {
+            Some(carrier) => {
+                let mut read = edit.expression(carrier).clone();
+                if let Expression::ImageSample {
+                    image: of,
+                    coordinate,
+                    array_index,
+                    ..
+                } = &mut read
+                {
+                    (*of, *coordinate, *array_index) = (image, self.root, self.layer);
                 }
-                *carrier
+                edit.rewrite(carrier, read);
+                edit.rename(carrier, format!("{path}.texel"));
+                carrier
             }
             None => {
                 let sampler = free_sampler(flow).expect("a plan without samples has one");
@@ -325,6 +368,7 @@ impl<'a> Plan<'a> {
                 Read {
                     binding: at.map_or((0, 0), |at| (at.group, at.binding)),
                     repeats: *repeats,
+                    is_layered: read.layer.is_some() && read.layer == self.layer,
                 }
             })
             .collect()
@@ -344,20 +388,26 @@ impl<'a> Plan<'a> {
             size: VectorSize::Quad,
             scalar: Scalar::F32,
         });
-        let at = |location| Binding::Location {
+        let layer = self.layer.map(|layer| ty(flow.inner(layer).clone()));
+        let at = |location, ty| Binding::Location {
             location,
-            interpolation: Some(naga::Interpolation::Perspective),
-            sampling: Some(naga::Sampling::Center),
+            interpolation: Some(match Some(ty) == layer {
+                true => naga::Interpolation::Flat,
+                false => naga::Interpolation::Perspective,
+            }),
+            sampling: (Some(ty) != layer).then_some(naga::Sampling::Center),
             blend_src: None,
             per_primitive: false,
         };
         let argument = |(location, name, ty)| FunctionArgument {
             name: Some(name),
             ty,
-            binding: Some(at(location)),
+            binding: Some(at(location, ty)),
         };
-        let levels = (1..=self.samples.len() as u32).map(|i| (i, format!("level_{i}"), float));
+        let behind = self.samples.len() as u32 + 1;
+        let levels = (1..behind).map(|i| (i, format!("level_{i}"), float));
         let arguments = std::iter::once((0, "coordinates".to_owned(), coordinates)).chain(levels);
+        let arguments = arguments.chain(layer.map(|ty| (behind, "layer".to_owned(), ty)));
         let mut function = Function {
             arguments: arguments.map(argument).collect(),
             ..Function::default()
@@ -384,13 +434,15 @@ impl<'a> Plan<'a> {
             edit.add(format!("{BAKE}.argument"), Expression::FunctionArgument(at))
         };
         let coordinates = argument(&mut edit, 0);
-        let levels = (1..=self.samples.len() as u32).map(|at| argument(&mut edit, at));
+        let levels = (1..behind).map(|at| argument(&mut edit, at));
         let levels = levels.collect();
+        let layer = layer.map(|_| argument(&mut edit, behind));
         let mut source = OfBake {
             flow,
             plan: self,
             coordinates,
             levels,
+            layer,
         };
         let value = self.slice.copy(&mut edit, &mut source);
         let path = format!("{BAKE}.texel");
@@ -432,11 +484,16 @@ struct OfBake<'p, 'a> {
     coordinates: Handle<Expression>,
     /// For each sample.
     levels: Vec<Handle<Expression>>,
+    /// Of an array.
+    layer: Option<Handle<Expression>>,
 }
 
 impl Source for OfBake<'_, '_> {
     fn instead(&mut self, _: &mut Edit<'_>, value: Value) -> Option<Handle<Expression>> {
-        (value == self.plan.root).then_some(self.coordinates)
+        match value == self.plan.root {
+            true => Some(self.coordinates),
+            false => self.layer.filter(|_| Some(value) == self.plan.layer),
+        }
     }
 
     fn path(&self, value: Value) -> String {
@@ -473,6 +530,20 @@ impl Source for OfBake<'_, '_> {
             (_, expression) => expression,
         }
     }
+}
+
+/// The variable of a texture that was made before and holds the same, in the same group.
+fn made_before(flow: &Flow, generated: &Generated) -> Option<Handle<GlobalVariable>> {
+    let mut all = flow.shader.generated.iter();
+    let same = all.find(|made| {
+        made.binding.0 == generated.binding.0 && made.definition() == generated.definition()
+    })?;
+    let mut variables = flow.module.global_variables.iter();
+    let (variable, _) = variables.find(|(_, variable)| {
+        let at = variable.binding.map(|at| (at.group, at.binding));
+        at == Some(same.binding)
+    })?;
+    Some(variable)
 }
 
 fn has_hole(flow: &Flow, value: Value) -> bool {
@@ -539,16 +610,20 @@ fn unneeded(flow: &Flow, slice: &Slice<'_>, site: Value) -> Vec<bool> {
     }
 }
 
-/// What a value is computed of down to its root; `None` when something in it is not known.
+/// What a value is computed of down to its root and its layer; `None` when something in it is not known.
 fn known_slice<'a>(
     flow: &'a Flow<'a>,
-    (site, root): (Value, Value),
+    site: Value,
+    (root, layer): (Value, Option<Value>),
     of: &[Of],
 ) -> Option<Slice<'a>> {
     let mut ends = vec![false; flow.function.expressions.len()];
-    ends[root.index()] = true;
+    let is_end = |value: Value| value == root || Some(value) == layer;
+    for (value, _) in flow.function.expressions.iter() {
+        ends[value.index()] = is_end(value);
+    }
     let slice = Slice::up_to(flow, site, ends);
-    let known = |value: Value| value == root || of[value.index()] != Of::Unknown;
+    let known = |value: Value| is_end(value) || of[value.index()] != Of::Unknown;
     let all_known = slice.values().all(known);
     all_known.then_some(slice)
 }

@@ -19,6 +19,8 @@ pub(super) struct Sample {
     pub(super) image: Value,
     pub(super) sampler: Value,
     pub(super) coordinate: Value,
+    /// The layer of an array.
+    pub(super) layer: Option<Value>,
     pub(super) level: SampleLevel,
 }
 
@@ -29,7 +31,7 @@ pub(super) fn sample(flow: &Flow, value: Value) -> Option<Sample> {
         sampler,
         gather: None,
         coordinate,
-        array_index: None,
+        array_index: layer,
         offset: None,
         level,
         depth_ref: None,
@@ -46,11 +48,11 @@ pub(super) fn sample(flow: &Flow, value: Value) -> Option<Sample> {
         flow.module.types[ty].inner,
         TypeInner::Image {
             dim: ImageDimension::D2 | ImageDimension::Cube,
-            arrayed: false,
             class: ImageClass::Sampled {
                 kind: ScalarKind::Float,
                 multi: false,
             },
+            ..
         }
     );
     let of_variable = matches!(
@@ -61,6 +63,7 @@ pub(super) fn sample(flow: &Flow, value: Value) -> Option<Sample> {
         image,
         sampler,
         coordinate,
+        layer,
         level,
     })
 }
@@ -92,7 +95,7 @@ pub(super) enum Of {
 }
 
 impl Of {
-    fn is_constant(&self) -> bool {
+    pub(super) fn is_constant(&self) -> bool {
         match self {
             Self::Constant => true,
             Self::Affine(rows) => rows.iter().all(|[u, v, _]| *u == 0.0 && *v == 0.0),
@@ -137,8 +140,8 @@ impl Of {
     }
 }
 
-/// What every value of a stage is, seen from a root.
-pub(super) fn seen_from(flow: &Flow, root: Value) -> Vec<Of> {
+/// What every value of a stage is, seen from a root: in each layer of arrays, where there is a value that chooses one.
+pub(super) fn seen_from(flow: &Flow, root: Value, layer: Option<Value>) -> Vec<Of> {
     let function = flow.function;
     let mut locals: Vec<Option<Of>> = vec![None; function.local_variables.len()];
     loop {
@@ -146,7 +149,7 @@ pub(super) fn seen_from(flow: &Flow, root: Value) -> Vec<Of> {
         for (value, _) in function.expressions.iter() {
             let seen = match value == root {
                 true => at_root(flow, root),
-                false => seen(flow, value, root, &of, &locals),
+                false => seen(flow, value, (root, layer), &of, &locals),
             };
             of.push(seen);
         }
@@ -192,7 +195,13 @@ fn stores(flow: &Flow, block: &Block, around: &Of, of: &[Of], locals: &mut [Opti
 }
 
 /// What a value is, as its operands are.
-fn seen(flow: &Flow, value: Value, root: Value, of: &[Of], locals: &[Option<Of>]) -> Of {
+fn seen(
+    flow: &Flow,
+    value: Value,
+    (root, layer): (Value, Option<Value>),
+    of: &[Of],
+    locals: &[Option<Of>],
+) -> Of {
     let at = |operand: Value| &of[operand.index()];
     let expression = &flow.function.expressions[value];
     if let Some(rows) = rows(flow, value, of) {
@@ -217,6 +226,9 @@ fn seen(flow: &Flow, value: Value, root: Value, of: &[Of], locals: &[Option<Of>]
             None => Of::Unknown,
         },
         Expression::ImageSample { .. } => match sample(flow, value) {
+            Some(Sample {
+                layer: Some(of), ..
+            }) if Some(of) != layer && !at(of).is_constant() => Of::Unknown,
             Some(read) if read.coordinate == root => Of::Texels {
                 linear: true,
                 at_root: true,

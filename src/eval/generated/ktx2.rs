@@ -1,4 +1,5 @@
-//! KTX2 files of uncompressed textures: two dimensions or a cube, all MIP levels (Khronos Texture File Format, version 2).
+//! KTX2 files of uncompressed textures: two dimensions or a cube, or arrays of them, all MIP levels (Khronos Texture File
+//! Format, version 2).
 
 use super::{MAX_EDGE, TexelFormat};
 use crate::eval::texture::{Dimension, Level, Texture};
@@ -14,6 +15,9 @@ const INDEX: usize = 80;
 
 /// The size of an entry of the index.
 const ENTRY: usize = 24;
+
+/// How many layers an array may have: WebGPU's default `maxTextureArrayLayers`.
+const MOST_LAYERS: u32 = 256;
 
 /// What is aligned to what: the texels of each level.
 const ALIGNMENT: usize = 8;
@@ -48,7 +52,12 @@ pub(super) fn write(texture: &Texture, format: TexelFormat) -> Vec<u8> {
         width,
         height,
         0,
-        0,
+        // None where it is no array.
+        if texture.layers() > 1 {
+            texture.layers()
+        } else {
+            0
+        },
         faces,
         levels.len() as u32,
         0,
@@ -150,7 +159,8 @@ pub(super) fn read(bytes: &[u8]) -> Option<Texture> {
         6 if width == height => Dimension::Cube,
         _ => return None,
     };
-    if depth? != 0 || layers? != 0 || compression? != 0 || !(1..32).contains(&count) {
+    let layers = layers?.max(1);
+    if depth? != 0 || layers > MOST_LAYERS || compression? != 0 || !(1..32).contains(&count) {
         return None;
     }
     let mut levels = Vec::new();
@@ -161,7 +171,7 @@ pub(super) fn read(bytes: &[u8]) -> Option<Texture> {
         let made = Level {
             width: (width >> level).max(1),
             height: (height >> level).max(1),
-            layers: faces?,
+            layers: layers * faces?,
             texels: data
                 .chunks_exact(format.bytes())
                 .map(|texel| format.decode(texel))
@@ -180,7 +190,7 @@ pub(super) fn read(bytes: &[u8]) -> Option<Texture> {
 mod tests {
     use super::*;
 
-    fn texture(dimension: Dimension, format: TexelFormat) -> Texture {
+    fn texture((dimension, layers): (Dimension, u32), format: TexelFormat) -> Texture {
         let level = |edge: u32, layers: u32| {
             let texel = |i: u32| [0, 1, 2, 3].map(|c| ((i * 7 + c * 31) % 256) as f32 / 255.0);
             Level {
@@ -192,7 +202,8 @@ mod tests {
                     .collect(),
             }
         };
-        let layers = if dimension == Dimension::Cube { 6 } else { 1 };
+        let faces = if dimension == Dimension::Cube { 6 } else { 1 };
+        let layers = layers * faces;
         let levels = [4, 2, 1].map(|edge| level(edge, layers));
         Texture::of_levels(dimension, levels.to_vec())
     }
@@ -200,7 +211,12 @@ mod tests {
     #[test]
     fn what_was_written_reads_the_same_and_what_is_damaged_is_refused() {
         for (format, _) in FORMATS {
-            for dimension in [Dimension::D2, Dimension::Cube] {
+            for dimension in [
+                (Dimension::D2, 1),
+                (Dimension::Cube, 1),
+                (Dimension::D2, 3),
+                (Dimension::Cube, 2),
+            ] {
                 let texture = texture(dimension, format);
                 let bytes = write(&texture, format);
                 assert_eq!(read(&bytes), Some(texture), "{format:?} {dimension:?}");
@@ -212,6 +228,9 @@ mod tests {
                 assert_eq!(read(&other), None);
                 let mut vast = bytes.clone();
                 vast[20..28].fill(0xff);
+                assert_eq!(read(&vast), None);
+                let mut vast = bytes.clone();
+                vast[32..36].fill(0xff);
                 assert_eq!(read(&vast), None);
             }
         }

@@ -39,7 +39,7 @@ pub struct Baked {
     pub texture: Arc<Texture>,
     /// How it is stored.
     pub format: TexelFormat,
-    /// Whether it is flat, and its MIP levels are those that a box filter makes of the finest one.
+    /// Whether it is one flat image, and its MIP levels are those that a box filter makes of the finest one.
     pub is_chain: bool,
     /// By how much the format changes a texel at most, in display values for colours.
     pub rounding: f32,
@@ -150,6 +150,7 @@ pub struct GeneratedTextures(Vec<Bake>);
 struct Bake {
     binding: (u32, u32),
     dimension: Dimension,
+    is_array: bool,
     definition: Fingerprint,
     program: Program,
     /// What the bake itself reads of generated textures.
@@ -214,6 +215,7 @@ impl Bake {
                 true => Dimension::Cube,
                 false => Dimension::D2,
             },
+            is_array: generated.is_array,
             definition: generated.definition(),
             program: Program::compile(shader.module(), entry, &[])?,
             textures: GeneratedTextures::of(shader)?,
@@ -223,14 +225,14 @@ impl Bake {
         })
     }
 
-    /// The textures that it reads, each with how often it repeats.
-    fn sources<'b>(&'b self, bindings: &'b Bindings) -> Vec<(&'b Texture, [f32; 2])> {
+    /// The textures that it reads.
+    fn sources<'b>(&'b self, bindings: &'b Bindings) -> Vec<(&'b Texture, &'b Read)> {
         let reads = self.reads.iter();
         reads
             .filter_map(|read| {
                 let bound = bindings.get(&read.binding)?.of_draw(0)?;
                 match bound {
-                    Resource::Texture(texture) => Some((&**texture, read.repeats)),
+                    Resource::Texture(texture) => Some((&**texture, read)),
                     _ => None,
                 }
             })
@@ -246,13 +248,17 @@ impl Bake {
         let sources = self.sources(&own);
         let mut size = [1.0_f32; 2];
         let mut levels = 1;
-        for (texture, repeats) in &sources {
+        let mut layers = 1;
+        for (texture, read) in &sources {
             let [width, height, _] = texture.size(0);
-            for (size, (edge, repeats)) in size.iter_mut().zip([width, height].iter().zip(repeats))
-            {
-                *size = size.max(*edge as f32 * repeats);
+            let edges = [width, height].into_iter().zip(read.repeats);
+            for (size, (edge, repeats)) in size.iter_mut().zip(edges) {
+                *size = size.max(edge as f32 * repeats);
             }
             levels = levels.max(texture.level_count());
+            if read.is_layered {
+                layers = layers.max(texture.layers());
+            }
         }
         // Halved, so that the texels of the sources still fall together.
         let most = self.edge.unwrap_or(MAX_EDGE).clamp(1, MAX_EDGE) as f32;
@@ -265,19 +271,16 @@ impl Bake {
         // The level of each source at which its texels are as large as those of the finest new one.
         let offsets: Vec<f64> = sources
             .iter()
-            .map(|(texture, repeats)| {
+            .map(|(texture, read)| {
                 let [width, height, _] = texture.size(0);
                 let scale = |edge: u32, repeats: f32, new: u32| {
                     f64::from(edge) * f64::from(repeats) / f64::from(new)
                 };
-                let across = scale(width, repeats[0], size[0]);
-                across.max(scale(height, repeats[1], size[1])).log2()
+                let across = scale(width, read.repeats[0], size[0]);
+                across.max(scale(height, read.repeats[1], size[1])).log2()
             })
             .collect();
-        let layers = match self.dimension {
-            Dimension::Cube => 6,
-            _ => 1,
-        };
+        let layers = layers * self.faces();
         let mut made: Vec<Level> = Vec::new();
         for level in 0..levels {
             let [width, height] = size.map(|edge| (edge >> level).max(1));
@@ -293,6 +296,14 @@ impl Bake {
             });
         }
         self.rounded(made)
+    }
+
+    /// How many images each of its layers has.
+    fn faces(&self) -> u32 {
+        match self.dimension {
+            Dimension::Cube => 6,
+            _ => 1,
+        }
     }
 
     /// The levels of a texture without sources, so many texels along each edge: means of points that are closer than texels.
@@ -323,6 +334,13 @@ impl Bake {
                 let Binding::Location { location, .. } = slot.binding else {
                     continue;
                 };
+                if self.is_array && location as usize == self.reads.len() + 1 {
+                    for (lane, word) in words.iter_mut().enumerate() {
+                        let image = (first + lane).min(count - 1) / (width * height);
+                        *word = image as u32 / self.faces();
+                    }
+                    continue;
+                }
                 if location > COORDINATES {
                     let detail = details.get(location as usize - 1);
                     *words = [detail.copied().unwrap_or(0.0).to_bits(); LANES];
@@ -335,7 +353,7 @@ impl Bake {
                     let s = (x as f32 + 0.5) / width as f32;
                     let t = (y as f32 + 0.5) / height as f32;
                     let point = match self.dimension {
-                        Dimension::Cube => cube_direction(at / (width * height), s, t),
+                        Dimension::Cube => cube_direction(at / (width * height) % 6, s, t),
                         _ => [s, t, 0.0],
                     };
                     *word = point[slot.component.min(2)].to_bits();
@@ -412,6 +430,7 @@ impl Bake {
         };
         let is_chain = format != TexelFormat::Rgba16Float
             && self.dimension == Dimension::D2
+            && !self.is_array
             && chain.levels().iter().zip(&levels).all(|(chain, level)| {
                 let mut pairs = chain.texels.iter().zip(&level.texels);
                 pairs.all(|(a, b)| is_step_apart(format, a, b, used))
