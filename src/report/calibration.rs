@@ -90,7 +90,7 @@ fn judged(judged: &Judged) -> String {
 /// Three figures.
 fn short(number: f64) -> String {
     match number {
-        x if x == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         x if x < 1e-3 => format!("{x:.1e}"),
         x if x < 10.0 => format!("{x:.3}"),
         x => format!("{x:.0}"),

@@ -37,6 +37,10 @@ pub(super) struct Verdict {
 
 /// Whether a variant may be a level.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "few are there at a time, and most are confirmed"
+)]
 pub(super) enum Finding {
     /// It may; what was measured at the start.
     Confirmed(Measured),

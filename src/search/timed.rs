@@ -280,7 +280,7 @@ impl<'c> Times<'c> {
                 runner.timed = timed;
                 runner.tried = true;
                 if let Some(ratio) = worst_ratio(&runner.timed) {
-                    let row = (runner.features.clone(), original.clone(), ratio);
+                    let row = (runner.features, *original, ratio);
                     self.known.push(row);
                 }
             }
