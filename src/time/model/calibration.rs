@@ -2,7 +2,7 @@
 //! fitted to.
 
 use super::features::COUNT;
-use super::{Features, Judged, Model, coefficient, he, judged};
+use super::{Features, Judged, Model, coefficient, figures, he, judged};
 use crate::Diagnostic;
 use crate::scene::chance::{child, unit};
 use serde::{Deserialize, Serialize};
@@ -241,14 +241,6 @@ impl Tested {
             },
         }
     }
-}
-
-/// A number to five figures: more would say nothing, and make files long.
-fn figures(number: f64) -> f64 {
-    if number == 0.0 || !number.is_finite() {
-        return 0.0;
-    }
-    format!("{number:.4e}").parse().unwrap_or(number)
 }
 
 #[cfg(test)]

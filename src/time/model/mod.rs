@@ -155,11 +155,11 @@ impl Model {
             adapter: adapter.map(str::to_owned),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             weights: weights
-                .map(|((name, ..), weight)| ((*name).to_owned(), weight))
+                .map(|((name, ..), weight)| ((*name).to_owned(), figures(weight)))
                 .collect(),
-            fragment_p: parameters.fragment_p,
-            geometry_p: parameters.geometry_p,
-            stamp_share: parameters.stamp_share,
+            fragment_p: figures(parameters.fragment_p),
+            geometry_p: figures(parameters.geometry_p),
+            stamp_share: figures(parameters.stamp_share),
         }
     }
 
@@ -222,6 +222,14 @@ fn amounts(features: &Features, stamp_share: f64) -> [f64; TERMS] {
         *amount = known;
     }
     amounts
+}
+
+/// A number to five figures: more would say nothing, make files long, and not always be read as it was written.
+fn figures(number: f64) -> f64 {
+    if number == 0.0 || !number.is_finite() {
+        return 0.0;
+    }
+    format!("{number:.4e}").parse().unwrap_or(number)
 }
 
 /// The p-norm of numbers from 0.
