@@ -22,7 +22,8 @@ use std::time::Duration;
 /// How long a variant's draw takes at a distance, against that of the original in the same batches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
-    /// The median of one instance's draw, over all rounds and the mean of the scene's views, milliseconds.
+    /// The median of one instance's draw, over all rounds and the mean of the scene's views, milliseconds: of the device's
+    /// timer, or, on a software adapter, of all its threads together on processors.
     pub ms: f64,
     /// The same of the original.
     pub original_ms: f64,
@@ -100,8 +101,8 @@ pub enum TimingWarning {
     /// The adapter is a program on the CPU: its times say nothing about a GPU.
     #[serde(rename = "software adapter")]
     SoftwareAdapter,
-    /// A batch took less than 50 of the timer's smallest steps, or the adapter has no timer of its own and the wall
-    /// clock was read around submission and completion.
+    /// A batch took less than 50 of the timer's smallest steps; or there was no timer but the wall clock, which was read
+    /// around submission and completion.
     #[serde(rename = "timer too coarse")]
     TimerTooCoarse,
     /// The original got slower from each fifth of the rounds to the next, by more than 10 % in all: the device was

@@ -146,3 +146,134 @@ pub fn throttles(rounds: &[Round]) -> bool {
     let parts: Vec<f64> = own.chunks_exact(fifth).take(5).map(median).collect();
     parts.is_sorted_by(|a, b| a < b) && parts[4] > THROTTLED * parts[0]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::{Timing, Verdict};
+
+    /// Numbers of a normal distribution of deviation 1, by chance.
+    fn normal(seed: u64) -> f64 {
+        let [a, b] = [0, 1].map(|number| unit(child(seed, number)));
+        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
+
+    /// Rounds of one variant that takes so many times as long as the original: noise of each time, a load that is there in
+    /// one round and, mostly, in the next, and interruptions of single batches.
+    fn rounds(seed: u64, count: usize, ratio: f64) -> Vec<Round> {
+        let mut load = 0.0;
+        let mut number = 0;
+        let mut chance = || {
+            number += 1;
+            child(seed, number)
+        };
+        (0..count)
+            .map(|_| {
+                load = 0.8 * load + 0.2 * normal(chance());
+                let mut time = |ratio: f64| {
+                    let interrupted = match unit(chance()) < 0.1 {
+                        true => 1.0 + unit(chance()),
+                        false => 1.0,
+                    };
+                    ratio * interrupted * (load + 0.05 * normal(chance())).exp()
+                };
+                Round {
+                    originals: [time(1.0), time(1.0)],
+                    variants: vec![time(ratio)],
+                }
+            })
+            .collect()
+    }
+
+    fn verdict(rounds: &[Round]) -> Verdict {
+        let ratio = ratio(rounds, 0);
+        Timing {
+            ms: 1.0,
+            original_ms: 1.0,
+            ratio: ratio.median,
+            low: ratio.low,
+            high: ratio.high,
+            floor: floor(rounds),
+            rounds: rounds.len() as u32,
+            draws: 1,
+            compile_ms: 0.0,
+            warnings: Vec::new(),
+            statistics: None,
+        }
+        .verdict()
+    }
+
+    /// How often of 1,000 times rounds of such a variant are called this.
+    fn said(wanted: Verdict, ratio: f64, count: usize) -> usize {
+        let verdicts = (0..1000).map(|seed| verdict(&rounds(seed, count, ratio)));
+        verdicts.filter(|verdict| *verdict == wanted).count()
+    }
+
+    #[test]
+    fn the_same_is_no_difference_in_noise_that_lasts_and_interrupts() {
+        for count in [7, 15, 40] {
+            let said = said(Verdict::NoDifference, 1.0, count);
+            assert!(said >= 990, "{count} rounds: {said}");
+        }
+    }
+
+    #[test]
+    fn a_fifth_more_or_less_is_told_apart_in_such_noise() {
+        let said = [(Verdict::Slower, 1.2), (Verdict::Faster, 1.0 / 1.2)]
+            .map(|(wanted, ratio)| said(wanted, ratio, 40));
+        assert!(said.iter().all(|count| *count >= 970), "{said:?}");
+    }
+
+    #[test]
+    fn an_interval_holds_the_truth_as_often_as_it_says() {
+        let holds = |seed| {
+            let own = ratio(&rounds(seed, 40, 1.0), 0);
+            own.low <= 1.0 && 1.0 <= own.high
+        };
+        let count = (0..1000).filter(|seed| holds(*seed)).count();
+        assert!(count >= 975, "{count}");
+    }
+
+    #[test]
+    fn an_estimate_is_of_the_series_and_the_same_always() {
+        let series: Vec<f64> = (0..30).map(|i| 1.0 + 0.1 * normal(i)).collect();
+        let own = Estimate::of(&series);
+        assert_eq!(own, Estimate::of(&series));
+        assert!(own.low < own.median && own.median < own.high && own.half_width() < 0.1);
+        assert_eq!(Estimate::of(&[2.0; 9]).half_width(), 0.0);
+        assert!(Estimate::of(&[]).median.is_nan());
+        assert_eq!(median(&[3.0, 1.0, 2.0, 10.0]), 2.5);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+    }
+
+    /// Rounds whose original takes so long, with little noise.
+    fn own(times: impl Iterator<Item = f64>) -> Vec<Round> {
+        let noisy = (0..).zip(times).map(|(seed, time)| {
+            let time = |number| time * (1.0 + 0.005 * normal(child(seed, number)));
+            Round {
+                originals: [time(0), time(1)],
+                variants: vec![time(2)],
+            }
+        });
+        noisy.collect()
+    }
+
+    #[test]
+    fn a_clock_that_drifts_or_is_throttled_is_said_to() {
+        let steady = own((0..50).map(|_| 3.0));
+        let slower = own((0..50).map(|i| 3.0 + 0.02 * f64::from(i)));
+        let faster = own((0..50).map(|i| 3.0 - 0.02 * f64::from(i)));
+        // It went and came back.
+        let hump = own((0..50).map(|i| 3.0 + 0.02 * f64::from((i - 25i32).abs())));
+        let said = |rounds: &[Round]| (drifts(rounds, floor(rounds)), throttles(rounds));
+        assert_eq!(said(&steady), (false, false));
+        assert_eq!(said(&slower), (true, true));
+        assert_eq!(said(&faster), (true, false));
+        assert_eq!(said(&hump), (false, false));
+        assert_eq!(said(&[]), (false, false));
+        // And ratios bear all of it.
+        for rounds in [slower, faster, hump] {
+            assert_eq!(verdict(&rounds), Verdict::NoDifference);
+        }
+    }
+}

@@ -2,9 +2,10 @@
 
 use super::pictures::open;
 use super::worker::worker;
-use super::{INTERFACES, written};
-use lodc::gpu::worker::{Failure, Variant};
-use lodc::time::{Effort, Verdict};
+use super::{INTERFACES, scratch, written};
+use lodc::front::{Modules, Stages};
+use lodc::gpu::worker::{Failure, Subject, Variant};
+use lodc::time::{Effort, Timing, TimingWarning, Verdict};
 use std::time::Duration;
 
 /// A fragment stage that goes round a loop so many times.
@@ -61,6 +62,112 @@ fn ten_times_the_work_takes_longer_and_the_same_does_not() {
             eprintln!("{interface}: {timing:?}");
         }
         assert_eq!(slow.verdict(), Verdict::Slower, "{slow:?}");
-        assert!(fast.ratio < 1.0, "{fast:?}");
+        assert_eq!(fast.verdict(), Verdict::Faster, "{fast:?}");
+        let software = open(interface).is_some_and(|gpu| gpu.label().software);
+        let warned = |timing: &Timing| timing.warnings.contains(&TimingWarning::SoftwareAdapter);
+        assert!([&same, &slow, &fast].iter().all(|t| warned(t) == software));
+        // Three frames of an object that is seen from the front, and helpers at most as many again.
+        if let Some(counted) = same.statistics {
+            assert!(counted.vertex_invocations >= 4.0, "{counted:?}");
+            assert!(counted.fragment_invocations >= 16.0, "{counted:?}");
+        }
     }
+}
+
+#[test]
+fn autolod_is_set_whether_it_is_an_override_or_in_a_buffer() {
+    if open("vulkan").is_none() {
+        return;
+    }
+    let declared = [
+        ("override autoLOD: f32 = 0.0;", "autoLOD"),
+        (
+            "struct Level { @size(16) autoLOD: f32 }\n@group(1) @binding(7) var<uniform> level: Level;",
+            "level.autoLOD",
+        ),
+    ];
+    let subject = written("timed-levels", &rounds(1000), "object = \"plane\"");
+    let mut worker = worker("vulkan");
+    for (declaration, value) in declared {
+        let text = rounds(1000).replace("1000u", &format!("select(1000u, 20u, {value} >= 2.0)"));
+        let all = [1.0, 3.0].map(|auto_lod| Variant {
+            text: Some(format!("{declaration}\n{text}")),
+            auto_lod: Some(auto_lod),
+        });
+        let timed = worker.time(&subject, &all, 4.0, &QUICK);
+        let timed = timed.unwrap_or_else(|failure| panic!("{failure:?}"));
+        let timed: Vec<Timing> = timed.into_iter().map(Result::unwrap).collect();
+        assert!(timed[1].high < timed[0].low, "{value}: {timed:?}");
+    }
+}
+
+#[test]
+fn blended_and_deferred_scenes_are_timed_and_colours_of_less_than_four_components() {
+    if open("vulkan").is_none() {
+        return;
+    }
+    let narrow = "@fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec2f { return uv; }";
+    let subjects = [
+        written("timed-blended", &rounds(50), "blend = \"alpha\""),
+        written("timed-linear", &rounds(50), "output = \"linear\""),
+        written("timed-narrow", narrow, ""),
+    ];
+    let mut worker = worker("vulkan");
+    let once = Effort {
+        rounds_at_least: 1,
+        rounds_at_most: 1,
+        ..QUICK
+    };
+    let deferred = super::fixtures::small_materials(&scratch("timed"), 16, &[]);
+    let deferred = deferred
+        .into_iter()
+        .find(|path| path.ends_with("gbuffer.wgsl"));
+    let deferred = deferred.expect("the material is there");
+    let deferred = Subject::new(deferred, None, &Stages::default(), &Modules::default());
+    for subject in subjects.iter().chain([&deferred]) {
+        let timed = worker.time(subject, &[Variant::default()], 4.0, &once);
+        let timed = timed.unwrap_or_else(|failure| panic!("{failure:?}"));
+        let timing = timed[0].as_ref().unwrap_or_else(|f| panic!("{f:?}"));
+        assert_eq!(timing.rounds, 1);
+        assert!(timing.ms > 0.0 && timing.warnings.contains(&TimingWarning::FewSamples));
+    }
+}
+
+#[test]
+fn a_variant_that_never_ends_does_not_keep_the_others_from_being_timed() {
+    if open("vulkan").is_none() {
+        return;
+    }
+    let endless = "@fragment fn fs(@location(0) uv: vec2f) -> @location(0) vec4f {
+            var x = uv.x;
+            loop {
+                for (var i = 0u; i < 1000000u; i++) { x = fract(pow(x + 1.5, 1.7) + sin(x)); }
+                if x > 2.0 { break; }
+            }
+            return vec4f(x);
+        }";
+    let subject = written("timed-endless", &rounds(50), "object = \"plane\"");
+    let mut worker = worker("vulkan");
+    // Before, so that the patience below is not for reading the scene.
+    let quick = Effort {
+        rounds_at_most: 1,
+        rounds_at_least: 1,
+        budget: Duration::from_millis(100),
+        ..QUICK
+    };
+    assert!(
+        worker
+            .time(&subject, &[Variant::default()], 4.0, &quick)
+            .is_ok()
+    );
+    worker.set_patience(Duration::from_secs(4));
+    let all = [variant(rounds(60)), variant(endless.to_owned())];
+    let timed = worker.time(&subject, &all, 4.0, &quick);
+    let timed = timed.unwrap_or_else(|failure| panic!("{failure:?}"));
+    assert!(timed[0].is_ok(), "{timed:?}");
+    assert!(matches!(timed[1], Err(Failure::Hung(_))), "{timed:?}");
+    // The original too: then there is nothing to say of any.
+    let subject = written("timed-endless-itself", endless, "object = \"plane\"");
+    let failed = worker.time(&subject, &all[..1], 4.0, &quick);
+    assert!(matches!(failed, Err(Failure::Hung(_))), "{failed:?}");
 }

@@ -1,9 +1,15 @@
-//! How long a device takes for what it is given, by its own timer or, where it has none, by the wall clock.
+//! How long a device takes for what it is given.
+//!
+//! A GPU is asked for its own timestamps. A software adapter is this process's threads, and what they take by any clock
+//! that goes on while they wait is mostly what other processes let them: so there it is the time that they ran on
+//! processors, where the system tells that. Where nothing better is left it is the wall clock.
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::read::words_of;
 use crate::{Diagnostic, Result};
-use std::time::Instant;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::time::{Duration, Instant};
 use wgpu::{BufferUsages, CommandBuffer, CommandEncoder, RenderPassTimestampWrites};
 
 /// How many timestamps are looked at for the timer's smallest step.
@@ -19,9 +25,15 @@ pub(super) enum Clock {
         /// The smallest difference that it was seen to make, but for none, nanoseconds.
         step: f64,
     },
+    /// What all threads of this process together ran on processors, from submission to completion.
+    Processor,
     /// The wall clock, from submission to completion.
     Wall,
 }
+
+/// For how long the threads of a software adapter go on after they are done, at most: they fall asleep then, and only
+/// then does the system count what they ran.
+const ASLEEP: Duration = Duration::from_micros(200);
 
 /// Where the timestamps of what is being recorded go.
 pub(super) struct Stamps<'a> {
@@ -47,7 +59,7 @@ impl<'a> Stamps<'a> {
 }
 
 impl Clock {
-    /// The device's clock. `pass` records a small pass.
+    /// The best clock for an adapter. `pass` records a small pass.
     ///
     /// # Errors
     /// When the device was lost.
@@ -55,6 +67,18 @@ impl Clock {
         gpu: &Gpu,
         pass: impl Fn(&mut CommandEncoder, Option<Stamps<'_>>),
     ) -> Result<Self> {
+        if gpu.label().software && ran().is_some() {
+            return Ok(Self::Processor);
+        }
+        let device = Self::of_device(gpu, pass)?;
+        Ok(device.unwrap_or(Self::Wall))
+    }
+
+    /// The device's own timer, where it has one that goes.
+    fn of_device(
+        gpu: &Gpu,
+        pass: impl Fn(&mut CommandEncoder, Option<Stamps<'_>>),
+    ) -> Result<Option<Self>> {
         let has = gpu
             .device()
             .features()
@@ -62,7 +86,7 @@ impl Clock {
         // OpenGL may tell the time at which a command was given, and not that at which it was done, as Mesa's does in
         // software.
         if !has || gpu.is_opengl() {
-            return Ok(Self::Wall);
+            return Ok(None);
         }
         let unit = f64::from(gpu.queue().get_timestamp_period());
         let stamps = stamps(gpu, LOOKED_AT, |set| {
@@ -79,7 +103,7 @@ impl Clock {
             .map(|pair| pair[1].saturating_sub(pair[0]));
         let step = differences.filter(|ticks| *ticks > 0).min();
         // A timer that stands still is none.
-        Ok(step.map_or(Self::Wall, |step| Self::Device {
+        Ok(step.map(|step| Self::Device {
             unit,
             step: step as f64 * unit,
         }))
@@ -89,6 +113,8 @@ impl Clock {
     pub(super) fn step(self) -> f64 {
         match self {
             Self::Device { step, .. } => step,
+            // What is missing of a thread that is still awake.
+            Self::Processor => 2e4,
             // What the system wakes a waiting thread by.
             Self::Wall => 1e5,
         }
@@ -110,17 +136,29 @@ impl Clock {
             encoder.finish()
         };
         match self {
-            Self::Wall => {
+            Self::Processor | Self::Wall => {
                 // Recorded before, so that nothing is recorded while something is timed.
                 let all: Vec<CommandBuffer> = (0..parts).map(|part| recorded(part, None)).collect();
-                let timed = all.into_iter().map(|commands| {
+                let mut times = Vec::new();
+                for commands in all {
+                    let before = match self {
+                        Self::Processor => ran(),
+                        _ => None,
+                    };
                     let start = Instant::now();
                     gpu.queue().submit([commands]);
                     let waited = gpu.device().poll(wgpu::PollType::wait_indefinitely());
                     waited.map_err(|error| unfinished(&error))?;
-                    Ok(start.elapsed().as_secs_f64() * 1e9)
-                });
-                timed.collect()
+                    let wall = start.elapsed().as_nanos() as f64;
+                    times.push(match before {
+                        None => wall,
+                        Some(before) => {
+                            std::thread::sleep(ASLEEP);
+                            ran().map_or(wall, |after| since(&before, &after) as f64)
+                        }
+                    });
+                }
+                Ok(times)
             }
             Self::Device { unit, .. } => {
                 let all = stamps(gpu, 2 * parts as u32, |set| {
@@ -143,6 +181,30 @@ impl Clock {
             }
         }
     }
+}
+
+/// How long each thread of this process has run on processors so far, nanoseconds; `None` where the system does not tell.
+fn ran() -> Option<BTreeMap<OsString, u64>> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?;
+    let mut all = BTreeMap::new();
+    for thread in threads {
+        let thread = thread.ok()?;
+        // One that ended meanwhile has none.
+        if let Ok(text) = std::fs::read_to_string(thread.path().join("schedstat")) {
+            let first = text.split_whitespace().next()?;
+            all.insert(thread.file_name(), first.parse().ok()?);
+        }
+    }
+    // Systems that do not count say 0.
+    all.values().any(|time| *time > 0).then_some(all)
+}
+
+/// What threads ran since before: all of it where they are new.
+fn since(before: &BTreeMap<OsString, u64>, after: &BTreeMap<OsString, u64>) -> u64 {
+    let own = |(thread, time): (&OsString, &u64)| {
+        time.saturating_sub(before.get(thread).copied().unwrap_or(0))
+    };
+    after.iter().map(own).sum()
 }
 
 fn unfinished(error: &dyn std::fmt::Display) -> Box<Diagnostic> {
@@ -194,5 +256,67 @@ pub(super) fn resolved<'a>(
         Ok(pairs
             .map(|[low, high]| u64::from(*high) << 32 | u64::from(*low))
             .collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::canvas::{Canvas, Views};
+    use super::super::tiles::{Part, Tiles};
+    use super::*;
+    use crate::time::statistics::median;
+    use wgpu::TextureFormat;
+
+    /// Passes that clear 512 x 512 pixels.
+    fn canvas(gpu: &Gpu) -> (Canvas, Views) {
+        let part = Part {
+            at: [0; 2],
+            size: [512; 2],
+        };
+        let formats = [Some(TextureFormat::Rgba8Unorm)];
+        let canvas = Canvas::new(gpu, &formats, Tiles::new(&[part], 1, 512));
+        let views = Views {
+            frame: [512; 2],
+            parts: vec![part],
+        };
+        (canvas, views)
+    }
+
+    #[test]
+    fn every_clock_sees_that_twenty_passes_take_longer_than_one() {
+        for label in crate::gpu::list() {
+            let gpu = Gpu::open(Some(&label.to_string())).unwrap();
+            let (canvas, views) = canvas(&gpu);
+            let of_device = Clock::of_device(&gpu, |encoder, stamps| {
+                canvas.record(&views, None, 0..1, stamps, encoder);
+            });
+            let mut clocks = vec![Clock::Wall];
+            clocks.extend(of_device.unwrap());
+            clocks.extend((label.software && ran().is_some()).then_some(Clock::Processor));
+            for clock in clocks {
+                assert!(clock.step() > 0.0);
+                let count = |part: usize| [1, 20][part % 2];
+                let times = clock.times(&gpu, 20, |part, encoder, stamps| {
+                    canvas.record(&views, None, 0..count(part), stamps, encoder);
+                });
+                let times = times.unwrap();
+                let of = |wanted| {
+                    let own = (0..20).filter(|part| count(*part) == wanted);
+                    median(&own.map(|part| times[part]).collect::<Vec<_>>())
+                };
+                assert!(of(20) > 2.0 * of(1), "{label}, {clock:?}: {times:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn threads_that_came_meanwhile_count() {
+        let threads = |all: &[(&str, u64)]| {
+            let all = all.iter().map(|(name, time)| (OsString::from(name), *time));
+            all.collect::<BTreeMap<_, _>>()
+        };
+        let before = threads(&[("1", 100), ("2", 50)]);
+        let after = threads(&[("1", 130), ("3", 7)]);
+        assert_eq!(since(&before, &after), 37);
     }
 }
