@@ -137,9 +137,10 @@ pub struct PipelineStatistics {
 /// How much time a timing may take, and how exact it is to be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
-    /// Rounds that are drawn in any case, unless twice the budget is used up.
+    /// Rounds that are drawn, unless twice the budget is used up before. Of less than four there is no interval, so that
+    /// there are never less.
     pub rounds_at_least: u32,
-    /// Rounds that are not exceeded.
+    /// Rounds that are not exceeded, beyond those four.
     pub rounds_at_most: u32,
     /// It ends when half of the ratio's interval, as a part of the ratio, is no more than this.
     pub half_width: f64,

@@ -264,7 +264,6 @@ mod tests {
     use super::super::canvas::{Canvas, Views};
     use super::super::tiles::{Part, Tiles};
     use super::*;
-    use crate::time::statistics::median;
     use wgpu::TextureFormat;
 
     /// Passes that clear 512 x 512 pixels.
@@ -283,9 +282,13 @@ mod tests {
     }
 
     #[test]
-    fn every_clock_sees_that_twenty_passes_take_longer_than_one() {
+    fn every_clock_sees_that_forty_passes_take_longer_than_one() {
         for label in crate::gpu::list() {
             let gpu = Gpu::open(Some(&label.to_string())).unwrap();
+            // It may leave out a pass whose picture is cleared again.
+            if gpu.is_opengl() {
+                continue;
+            }
             let (canvas, views) = canvas(&gpu);
             let of_device = Clock::of_device(&gpu, |encoder, stamps| {
                 canvas.record(&views, None, 0..1, stamps, encoder);
@@ -295,16 +298,17 @@ mod tests {
             clocks.extend((label.software && ran().is_some()).then_some(Clock::Processor));
             for clock in clocks {
                 assert!(clock.step() > 0.0);
-                let count = |part: usize| [1, 20][part % 2];
+                let count = |part: usize| [1, 40][part % 2];
                 let times = clock.times(&gpu, 20, |part, encoder, stamps| {
                     canvas.record(&views, None, 0..count(part), stamps, encoder);
                 });
                 let times = times.unwrap();
+                // The least, since other processes make some of them longer.
                 let of = |wanted| {
                     let own = (0..20).filter(|part| count(*part) == wanted);
-                    median(&own.map(|part| times[part]).collect::<Vec<_>>())
+                    own.map(|part| times[part]).fold(f64::INFINITY, f64::min)
                 };
-                assert!(of(20) > 2.0 * of(1), "{label}, {clock:?}: {times:?}");
+                assert!(of(40) > 2.0 * of(1), "{label}, {clock:?}: {times:?}");
             }
         }
     }

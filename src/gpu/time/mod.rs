@@ -46,6 +46,8 @@ const MOST_SUBMISSIONS: u32 = 64;
 const EDGE: u32 = 2048;
 /// How many variants share a round: the more, the farther the original is from each.
 const TOGETHER: usize = 6;
+/// The fewest rounds that an interval is of.
+const FEWEST: u32 = 4;
 /// How often the cleared picture is timed.
 const CLEARED: usize = 9;
 
@@ -248,12 +250,11 @@ impl Renderer<'_> {
             rounds.push(batches.round(gpu, &shaders, rounds.len(), cleared)?);
             let count = rounds.len() as u32;
             let spent = start.elapsed();
-            let enough = count >= effort.rounds_at_least.max(1);
-            let last = count >= effort.rounds_at_most
-                || spent >= 2 * budget
-                || (enough && spent >= budget);
+            let enough = count >= effort.rounds_at_least;
+            let over = spent >= 2 * budget || (enough && spent >= budget);
+            let last = count >= FEWEST && (over || count >= effort.rounds_at_most);
             // An estimate takes its time too: it is made again when there is a quarter more to make it of.
-            if !last && (!enough || 4 * count < 5 * judged) {
+            if !last && (!enough || count < FEWEST || 4 * count < 5 * judged) {
                 continue;
             }
             judged = count;
