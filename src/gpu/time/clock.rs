@@ -120,6 +120,15 @@ impl Clock {
         }
     }
 
+    /// How long a batch takes at least, nanoseconds.
+    pub(super) fn least(self) -> f64 {
+        match self {
+            // Waking threads and putting them to sleep takes some time more or less.
+            Self::Processor => 2e7,
+            Self::Device { .. } | Self::Wall => 4e6,
+        }
+    }
+
     /// How long each of so many parts takes that are submitted one after the other, nanoseconds. `record` records one.
     ///
     /// # Errors

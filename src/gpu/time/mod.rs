@@ -33,8 +33,6 @@ use wgpu::{Features, PipelineStatisticsTypes, TextureFormat};
 
 /// How many of the timer's smallest steps a batch takes at least.
 const STEPS: f64 = 50.0;
-/// How long a batch of the original takes at least, nanoseconds.
-const LEAST: f64 = 4e6;
 /// How long a submission takes at most, nanoseconds, unless one instance takes longer. Systems give up a device that does not
 /// answer for some two seconds.
 const MOST: f64 = 2e8;
@@ -333,7 +331,7 @@ impl<'a> Batches<'a> {
             let [shortest, longest] =
                 [f64::min, f64::max].map(|of| times.iter().copied().fold(times[0], of));
             batches.shortest = shortest;
-            let wanted = (LEAST / times[0]).max(STEPS * clock.step() / shortest);
+            let wanted = (clock.least() / times[0]).max(STEPS * clock.step() / shortest);
             let instances = f64::from(batches.instances);
             // Short times are not to be trusted.
             let factor = wanted.min(8.0).min((MOST / longest).max(1.0));
