@@ -262,7 +262,9 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .extend(reached.iter().map(|w| w.message.clone()));
     let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
     let many = too_many(&ready.base, textures.len(), emission);
-    let visible: Vec<Box<Diagnostic>> = visible.into_iter().chain(many).chain(of_time).collect();
+    let limit = limits_nothing(&ready.scene);
+    let visible = visible.into_iter().chain(many).chain(of_time);
+    let visible: Vec<Box<Diagnostic>> = visible.chain(limit).collect();
     origin
         .warnings
         .extend(visible.iter().map(|w| w.message.clone()));
@@ -327,6 +329,19 @@ fn too_many(base: &Shader, made: usize, emission: Output) -> Option<Box<Diagnost
             "all levels together sample {all} textures, and WebGPU's default limit is {MOST_TEXTURES}"
         ))
         .with_note("ask the device for more, or write one file a level: `--form files`")
+    })
+}
+
+/// Warns where the memory of made textures is limited, and none are made.
+fn limits_nothing(scene: &Scene) -> Option<Box<Diagnostic>> {
+    let host = scene.host;
+    (host.most_texture_bytes.is_some() && !host.textures).then(|| {
+        Diagnostic::warning(
+            "the memory of textures that are made for levels is limited, but none may be made",
+        )
+        .with_note(
+            "allow them with `--host textures`, or `host = { textures = true }` in the scene; else leave the limit out",
+        )
     })
 }
 

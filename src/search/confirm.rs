@@ -169,12 +169,14 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// A confirmed variant as a level; what each step leaves is measured on the search's own samples.
+    /// A confirmed variant as a level, which asks the host for nothing unless it may; what each step leaves is measured on
+    /// the search's own samples.
     pub(super) fn level(
         &self,
         Confirmed { recipe, measured }: &Confirmed,
         search: &SampleSet<'_>,
         kept: &Kept,
+        asks: bool,
     ) -> Option<Level> {
         let start = self.start();
         let distance = start.distance();
@@ -187,7 +189,7 @@ impl<'a> Checks<'a> {
             && let Ok(less) = start.measure(&moved)
             && less.cost < measured.cost
         {
-            if self.stand.scene.host.parameters {
+            if asks && self.stand.scene.host.parameters {
                 (recipe, shader, measured) = (longer, moved, less);
             } else {
                 with_parameters = Some(start.share(less.cost));

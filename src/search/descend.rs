@@ -38,6 +38,8 @@ pub(super) struct Confirmed {
 pub(super) struct Bottom<'a, 'b> {
     pub(super) interval: &'a Interval<'b>,
     pub(super) checks: &'a Checks<'b>,
+    /// Whether a host may be asked for what the scene allows.
+    pub(super) asks: bool,
     pub(super) guard: &'a mut Guard<'b>,
     pub(super) prices: &'a mut Prices,
     /// Every variant that was seen.
@@ -53,13 +55,16 @@ pub(super) struct Bottom<'a, 'b> {
 }
 
 impl Bottom<'_, '_> {
-    /// Searches from the original and from another start.
-    pub(super) fn find(&mut self, base: &Variant, start: Variant) -> Result<(), Refused> {
+    /// Searches from the original and from other starts.
+    pub(super) fn find(&mut self, base: &Variant, starts: Vec<Variant>) -> Result<(), Refused> {
         self.frontier.add(base.seen());
-        let mut ways = vec![vec![Stop::from(base.clone())]];
-        if !start.recipe.0.is_empty() && self.guard.allows(&start.shader, &start.measured) {
-            ways.insert(0, vec![base.clone().into(), start.into()]);
+        let mut ways = Vec::new();
+        for start in starts {
+            if !start.recipe.0.is_empty() && self.guard.allows(&start.shader, &start.measured) {
+                ways.push(vec![base.clone().into(), start.into()]);
+            }
         }
+        ways.push(vec![Stop::from(base.clone())]);
         let mut taken = Vec::new();
         for mut way in ways {
             let mut rounds = ROUNDS;
@@ -100,6 +105,7 @@ impl Bottom<'_, '_> {
             *rounds -= 1;
             let descent = Descent {
                 interval: self.interval,
+                asks: self.asks,
                 guard: self.guard,
                 progress: &|measured, share| (self.progress)(self.variants + measured, share),
             };

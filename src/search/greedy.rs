@@ -145,6 +145,8 @@ impl From<Variant> for Stop {
 pub(crate) struct Descent<'a, 'b> {
     /// The samples that it is judged on, within their bounds.
     pub(crate) interval: &'a Interval<'b>,
+    /// Whether a host may be asked for what the scene allows.
+    pub(crate) asks: bool,
     /// What every step has to pass.
     pub(crate) guard: &'a Guard<'b>,
     /// Told how many variants have been measured, and the cost of the current one as a share of the
@@ -185,8 +187,10 @@ impl Descent<'_, '_> {
             let facts = self.interval.start().facts(&current.shader);
             // What is exact was done before, or is not wanted.
             let host = self.interval.start().stand.scene.host;
-            let asking = WITH_PARAMETERS.iter().filter(|_| host.parameters);
-            let making = WITH_TEXTURES.iter().filter(|_| host.textures);
+            let asking = WITH_PARAMETERS.iter();
+            let asking = asking.filter(|_| self.asks && host.parameters);
+            let making = WITH_TEXTURES.iter();
+            let making = making.filter(|_| self.asks && host.textures);
             let passes = PASSES.iter().filter(|pass| !pass.is_exact());
             let passes = passes.chain(asking).chain(making);
             let kept = self.guard.kept();

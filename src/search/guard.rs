@@ -59,7 +59,7 @@ impl<'a> Guard<'a> {
     }
 
     /// Whether a shader of all levels has room for what this one hands over.
-    fn has_room(&self, shader: &Shader) -> bool {
+    pub(crate) fn has_room(&self, shader: &Shader) -> bool {
         let levels = self.levels.iter().chain([shader]);
         shader.handing_over().is_none()
             || shared_locations(self.stand.base, levels, self.kept.apart)

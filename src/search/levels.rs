@@ -184,10 +184,173 @@ pub struct Progress {
     pub share: f64,
 }
 
+/// Levels as they are found from distance to distance, and what was learnt on the way.
+struct Chain<'a> {
+    /// Whether they may ask the host for what the scene allows.
+    asks: bool,
+    levels: Vec<Level>,
+    prices: Prices,
+    guard: Guard<'a>,
+}
+
+impl<'a> Chain<'a> {
+    fn new(asks: bool, first: Level, guard: Guard<'a>) -> Self {
+        Self {
+            asks,
+            levels: vec![first],
+            prices: Prices::default(),
+            guard,
+        }
+    }
+
+    fn last(&self) -> &Level {
+        &self.levels[self.levels.len() - 1]
+    }
+
+    /// Looks for the level of an interval. `plain` is the one there that asks a host for nothing, of a chain that may.
+    fn go_on(
+        &mut self,
+        place: &Place<'a, '_>,
+        plain: Option<&Level>,
+        mut times: Option<&mut Times<'_>>,
+        tally: &mut Tally,
+        progress: &(dyn Fn(u64, f64) + Sync),
+    ) -> Result<Timed, Refused> {
+        let &Place {
+            stand,
+            exact,
+            kept,
+            search,
+            checks,
+        } = place;
+        self.guard.start_at(search.start().distance());
+        let base = Variant::new(search, Recipe::default(), exact.shader.clone())?;
+        let before = self.last().clone();
+        let start = |level: &Level| {
+            // What was moved exactly is chosen anew where the level ends.
+            let lossy = parameters::without_exact(&level.recipe);
+            let (recipe, shader) = match lossy.replay(&exact.shader) {
+                Ok(shader) if lossy != level.recipe => (lossy, shader),
+                _ => (level.recipe.clone(), level.shader.clone()),
+            };
+            Variant::new(search, recipe, shader)
+        };
+        let mut starts = vec![start(&before)?];
+        let mut bottom = Bottom {
+            interval: search,
+            checks,
+            asks: self.asks,
+            guard: &mut self.guard,
+            prices: &mut self.prices,
+            frontier: std::mem::take(&mut tally.frontier),
+            found: None,
+            variants: tally.variants,
+            withdrawn: tally.withdrawn,
+            progress,
+        };
+        // What draws the same for less may be a level by itself.
+        if exact.cost() < 1.0 - MERGE_BELOW {
+            bottom.judge(&base)?;
+        }
+        if let Some(plain) = plain.filter(|plain| !plain.recipe.0.is_empty()) {
+            let plain = start(plain)?;
+            if bottom.guard.has_room(&plain.shader) {
+                bottom.judge(&plain)?;
+                starts.push(plain);
+            }
+        }
+        bottom.find(&base, starts)?;
+        let timed = match &mut times {
+            Some(times) => bottom.choose_by(times)?,
+            None => Timed::default(),
+        };
+        let Bottom {
+            frontier,
+            found,
+            withdrawn,
+            variants,
+            ..
+        } = bottom;
+        *tally = Tally {
+            frontier,
+            variants,
+            withdrawn,
+        };
+        let found = found.and_then(|found| checks.level(&found, search.start(), kept, self.asks));
+        // What vertices do weighs more the farther away it is.
+        let cost_here = checks.cost(&before.shader)?;
+        let without = plain.map(|plain| checks.cost(&plain.shader)).transpose()?;
+        let is_dearer = without.is_some_and(|without| cost_here > without);
+        // The steps of what was found were sifted since, and the level before is judged where this one begins.
+        let mut before_here = Vec::new();
+        let found = match (found, times) {
+            (Some(level), Some(times)) => {
+                let shaders = [&level.shader, &before.shader];
+                let mut timed = times.clock.time(&shaders, search.start().distance());
+                before_here = timed.pop().unwrap_or_default();
+                let timed = timed.pop().unwrap_or_default();
+                Some(Level { timed, ..level })
+            }
+            (found, _) => found,
+        };
+        // What the clock says of both decides where time is all that counts; noise is no gain.
+        let by_time = stand.scene.goal.weight_of_time() == 1.0;
+        let time_here = match before.is_original {
+            true => Some(1.0),
+            false => worst_ratio(&before_here),
+        };
+        let worth = |level: &Level| match (worst_ratio(&level.timed), time_here) {
+            (Some(time), Some(here)) if by_time => {
+                let gains = match before.is_original {
+                    true => level.is_faster(),
+                    false => is_faster(&level.timed, &before_here),
+                };
+                gains && time < (1.0 - MERGE_BELOW) * here
+            }
+            _ if is_dearer => level.cost < cost_here,
+            _ => level.cost < (1.0 - MERGE_BELOW) * cost_here,
+        };
+        // Without a level here the one before is used on, where it has not been looked at yet.
+        let next_level = match found {
+            Some(level) if worth(&level) => Some(level),
+            _ if before.is_original => None,
+            _ if cost_here <= 1.0 && checks.hold(&before.shader) => None,
+            Some(level) => Some(level),
+            None => Some(Level::back(stand, checks.start(), exact)?),
+        };
+        if let Some(level) = next_level {
+            self.guard.beside(level.shader.clone());
+            self.levels.push(level);
+        }
+        Ok(timed)
+    }
+}
+
+/// An interval that levels are searched in.
+struct Place<'a, 'p> {
+    stand: &'a Stand<'a>,
+    exact: &'p Exact,
+    kept: &'p Kept,
+    search: &'p Interval<'a>,
+    checks: &'p Checks<'a>,
+}
+
+/// What was seen in an interval so far.
+#[derive(Default)]
+struct Tally {
+    frontier: Frontier,
+    variants: u64,
+    withdrawn: usize,
+}
+
 /// Searches the levels of a shader in a scene: what costs no error first, then greedy at each distance, every variant that
 /// was seen on the frontier, frontier members confirmed on the full set.
 ///
 /// With a clock, variants are timed, and chosen by that; without, by their estimated time.
+///
+/// What a host allows opens steps that save much and lead to where little more can be saved. So where it allows anything, levels that
+/// ask it for nothing are found as well, and what asks for something goes on from them, too: permission never makes a level
+/// dearer, by its estimate.
 ///
 /// # Errors
 /// When the evaluator refuses the original, at the expression.
@@ -205,15 +368,15 @@ pub fn find(
         Scope::None => Exact::none(stand, &nearest),
         Scope::Levels | Scope::All => Exact::find(stand, &nearest, kept)?,
     };
-    let mut levels = vec![match scope == Scope::All && !exact.recipe.0.is_empty() {
+    let mut first = match scope == Scope::All && !exact.recipe.0.is_empty() {
         true => Level::exact(stand, &nearest, &exact),
         false => Level::original(stand, &nearest),
-    }];
+    };
     if let Some(times) = &mut times
-        && !levels[0].is_original
+        && !first.is_original
     {
-        let timed = times.clock.time(&[&levels[0].shader], distances[0]).pop();
-        levels[0].timed = timed.unwrap_or_default();
+        let timed = times.clock.time(&[&first.shader], distances[0]).pop();
+        first.timed = timed.unwrap_or_default();
     }
     // Where the original uses nothing of what is to become less, there is nothing to look for.
     let distances = match scene.goal.is_reached(&nearest.original().used) {
@@ -222,8 +385,9 @@ pub fn find(
     };
     drop(nearest);
     let mut seen = Vec::new();
-    let mut prices = Prices::default();
-    let mut guard = Guard::new(stand, kept);
+    let chain = |asks| Chain::new(asks, first.clone(), Guard::new(stand, kept));
+    let mut without = (scene.host.parameters || scene.host.textures).then(|| chain(false));
+    let mut chain = chain(true);
     let (mut variants, mut timed_variants) = (0, 0);
     let mut before_checks = None;
     for (at, distance) in distances.iter().copied().enumerate().skip(1) {
@@ -232,98 +396,40 @@ pub fn find(
         let search = Interval::new(stand, &[distance, next], Samples::Search)?;
         let places = [distance, middle, next];
         let checks = Checks::new(stand, &exact.shader, places, before_checks.take())?;
-        guard.start_at(distance);
-        let mut bottom = Bottom {
-            interval: &search,
+        let place = Place {
+            stand,
+            exact: &exact,
+            kept,
+            search: &search,
             checks: &checks,
-            guard: &mut guard,
-            prices: &mut prices,
+        };
+        let mut tally = Tally {
             frontier: match times {
                 Some(_) => Frontier::with_near(),
                 None => Frontier::default(),
             },
-            found: None,
             variants,
-            withdrawn: 0,
-            progress: &|variants, share| {
-                progress(Progress {
-                    distance: at,
-                    of: distances.len() - 1,
-                    variants,
-                    share,
-                });
-            },
+            ..Tally::default()
         };
-        let base = Variant::new(&search, Recipe::default(), exact.shader.clone())?;
-        let before = &levels[levels.len() - 1];
-        // What was moved exactly is chosen anew where the level ends.
-        let lossy = parameters::without_exact(&before.recipe);
-        let (recipe, shader) = match lossy.replay(&exact.shader) {
-            Ok(shader) if lossy != before.recipe => (lossy, shader),
-            _ => (before.recipe.clone(), before.shader.clone()),
+        let tell = |variants, share| {
+            progress(Progress {
+                distance: at,
+                of: distances.len() - 1,
+                variants,
+                share,
+            });
         };
-        let start = Variant::new(&search, recipe, shader)?;
-        // What draws the same for less may be a level by itself.
-        if exact.cost() < 1.0 - MERGE_BELOW {
-            bottom.judge(&base)?;
+        let levels = chain.levels.len();
+        if let Some(without) = &mut without {
+            without.go_on(&place, None, None, &mut tally, &tell)?;
         }
-        bottom.find(&base, start)?;
-        let timed = match &mut times {
-            Some(times) => bottom.choose_by(times)?,
-            None => Timed::default(),
-        };
-        let Bottom {
-            frontier,
-            found,
-            withdrawn,
-            variants: measured,
-            ..
-        } = bottom;
-        variants = measured;
+        let plain = without.as_ref().map(Chain::last);
+        let timed = chain.go_on(&place, plain, times.as_mut(), &mut tally, &tell)?;
         timed_variants += timed.count;
-        let found = found.and_then(|found| checks.level(&found, search.start(), kept));
-        // What vertices do weighs more the farther away it is.
-        let cost_here = checks.cost(&before.shader)?;
-        // The steps of what was found were sifted since, and the level before is judged where this one begins.
-        let mut before_here = Vec::new();
-        let found = match (found, &mut times) {
-            (Some(level), Some(times)) => {
-                let mut timed = times.clock.time(&[&level.shader, &before.shader], distance);
-                before_here = timed.pop().unwrap_or_default();
-                let timed = timed.pop().unwrap_or_default();
-                Some(Level { timed, ..level })
-            }
-            (found, _) => found,
-        };
-        // What the clock says of both decides where time is all that counts; noise is no gain.
-        let by_time = scene.goal.weight_of_time() == 1.0;
-        let time_here = match before.is_original {
-            true => Some(1.0),
-            false => worst_ratio(&before_here),
-        };
-        let worth = |level: &Level| match (worst_ratio(&level.timed), time_here) {
-            (Some(time), Some(here)) if by_time => {
-                let gains = match before.is_original {
-                    true => level.is_faster(),
-                    false => is_faster(&level.timed, &before_here),
-                };
-                gains && time < (1.0 - MERGE_BELOW) * here
-            }
-            _ => level.cost < (1.0 - MERGE_BELOW) * cost_here,
-        };
-        // Without a level here the one before is used on, where it has not been looked at yet.
-        let next_level = match found {
-            Some(level) if worth(&level) => Some(level),
-            _ if before.is_original => None,
-            _ if cost_here <= 1.0 && checks.hold(&before.shader) => None,
-            Some(level) => Some(level),
-            None => Some(Level::back(stand, checks.start(), &exact)?),
-        };
-        if let Some(mut level) = next_level {
-            level.held_out = Some(test(stand, &level)?);
-            guard.beside(level.shader.clone());
-            levels.push(level);
+        for level in &mut chain.levels[levels..] {
+            level.held_out = Some(test(stand, level)?);
         }
+        variants = tally.variants;
         before_checks = Some(checks);
         let original = search.start().original();
         seen.push(AtDistance {
@@ -331,11 +437,12 @@ pub fn find(
             autolod: scene.auto_lod(distance),
             original: original.cost,
             floor_square: original.error.square(),
-            frontier: frontier.members().to_vec(),
+            frontier: tally.frontier.members().to_vec(),
             timed: timed.frontier,
-            withdrawn,
+            withdrawn: tally.withdrawn,
         });
     }
+    let levels = chain.levels;
     Ok(Found {
         exact,
         levels,
@@ -358,4 +465,90 @@ fn test(stand: &Stand<'_>, level: &Level) -> Result<HeldOut, Refused> {
     let set = SampleSet::new(stand, level.distance, Samples::HeldOut(Split::Test))?;
     let (details, original) = set.pair(&level.shader)?;
     Ok(HeldOut::new(&details, original))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::normal_form;
+    use crate::eval::program::Program;
+    use crate::front::Source;
+    use std::path::Path;
+
+    #[test]
+    fn a_level_that_asks_for_nothing_is_where_others_go_on_from() {
+        let source = Source::parse(
+            "felt.wgsl",
+            "@group(0) @binding(0) var soft: texture_2d<f32>;
+             @group(0) @binding(1) var rough: texture_2d<f32>;
+             @group(0) @binding(2) var filtering: sampler;
+             @fragment fn fs_main(@location(0) uv: vec2f) -> @location(0) vec4f {
+                 let dye = textureSample(soft, filtering, uv).xyz;
+                 let felt = 0.9 + 0.2 * textureSample(rough, filtering, uv).x;
+                 return vec4f(dye * felt, 1.0);
+             }",
+        )
+        .expect("it parses");
+        let text = "resolution = [64, 64]
+             [textures]
+             soft = \"textures/diffuse_lut.png\"
+             rough = \"textures/grain_height.png\"";
+        let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
+        let scene = Scene::resolve(&source, Some((&materials.join("felt.toml"), text)));
+        let mut scene = scene.unwrap_or_else(|e| panic!("{e}"));
+        scene.distances.truncate(2);
+        let base = normal_form(&source).expect("it is small");
+        let stage = scene.vertex_stage.clone().expect("lodc supplies one");
+        let vertex = Program::compile(&stage.module, 0, &[]).expect("it is plain");
+        let mut costs = Vec::new();
+        let mut plain = None;
+        for textures in [false, true] {
+            scene.host.textures = textures;
+            let stand = Stand {
+                base: &base,
+                vertex: &vertex,
+                scene: &scene,
+            };
+            let kept = Kept::default();
+            let found = find(&stand, (Scope::None, &kept), None, &|_| {}).expect("it runs");
+            let level = &found.levels[found.levels.len() - 1];
+            costs.push(level.cost);
+            plain.get_or_insert(level.clone());
+        }
+        assert!(costs[0] < 0.6 && costs[1] <= costs[0], "{costs:?}");
+
+        // One that finds nothing by itself has that level, too.
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let near = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
+        let exact = Exact::none(&stand, &near);
+        let distance = scene.distances[1];
+        let places = [1.0, 1.5, 2.0].map(|times| distance * times);
+        let search = Interval::new(&stand, &[distance, 2.0 * distance], Samples::Search);
+        let search = search.expect("it runs");
+        let checks = Checks::new(&stand, &base, places, None).expect("it runs");
+        let kept = Kept {
+            only: ["no pass".to_owned()].into(),
+            ..Kept::default()
+        };
+        let place = Place {
+            stand: &stand,
+            exact: &exact,
+            kept: &kept,
+            search: &search,
+            checks: &checks,
+        };
+        let found = [None, plain.as_ref()].map(|plain| {
+            let first = Level::original(&stand, &near);
+            let mut chain = Chain::new(true, first, Guard::new(&stand, &kept));
+            let mut tally = Tally::default();
+            let gone = chain.go_on(&place, plain, None, &mut tally, &|_, _| {});
+            gone.expect("it runs");
+            chain.last().cost
+        });
+        assert_eq!(found, [1.0, costs[0]]);
+    }
 }

@@ -136,9 +136,19 @@ mod tests {
 
     /// A material of the repository and its scene, with so many pixels along an edge.
     fn material(name: &str, pixels: u32) -> (Shader, Scene) {
+        changed_material(name, pixels, |text| text)
+    }
+
+    /// The same with another text.
+    fn changed_material(
+        name: &str,
+        pixels: u32,
+        change: impl FnOnce(String) -> String,
+    ) -> (Shader, Scene) {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
         let path = folder.join(name).with_extension("wgsl");
-        let source = Source::read(&path).expect("it parses");
+        let text = std::fs::read_to_string(&path).expect("it is there");
+        let source = Source::parse(&path.display().to_string(), change(text)).expect("it parses");
         let path = path.with_extension("toml");
         let text = std::fs::read_to_string(&path).expect("it is there");
         let lines = text.lines().filter(|line| !line.starts_with("resolution"));
@@ -222,6 +232,52 @@ mod tests {
             cost(2.5),
             cost(20.0)
         );
+    }
+
+    #[test]
+    fn two_sums_over_the_lamps_of_clay_cost_one_loop_at_the_vertices() {
+        // Lamps are seen in a glaze as well.
+        let glazed = |text: String| {
+            text.replace(
+                "var diffuse = sky;",
+                "var diffuse = sky; var gloss = vec3f();",
+            )
+            .replace(
+                "let falloff = ",
+                "let shine = dot(normal, normalize(towards + to_eye)); let falloff = ",
+            )
+            .replace("    // Dust", "    let glaze = gloss * gloss;\n    // Dust")
+            .replace(
+                "        diffuse +=",
+                "        gloss += lamp.colour * (falloff * shine);\n        diffuse +=",
+            )
+            .replace("clay.colour * diffuse", "clay.colour * diffuse + glaze")
+        };
+        let (base, scene) = changed_material("clay", 32, glazed);
+        let (vertex, _) = vertex(&base).expect("it runs").expect("it has one");
+        let stand = Stand {
+            base: &base,
+            vertex: &vertex,
+            scene: &scene,
+        };
+        let set = SampleSet::new(&stand, scene.nearest, Samples::Full).expect("it runs");
+        let cost = |sites: &[&str]| {
+            let mut shader = base.clone();
+            for site in sites {
+                let mut all = VertexMotion
+                    .candidates(&shader, &set.facts(&base))
+                    .into_iter();
+                let found = all.find(|candidate| candidate.site.path() == *site);
+                let found = found.unwrap_or_else(|| panic!("{site} is not offered"));
+                shader = recipe::apply(&shader, &found).expect("it was offered");
+            }
+            set.measure(&shader).expect("it runs").used.work.moved
+        };
+        let diffuse = cost(&["fs_main.light.mul"]);
+        let gloss = cost(&["fs_main.gloss_3"]);
+        let both = cost(&["fs_main.light.mul", "fs_main.gloss_3"]);
+        println!("at the vertices: {diffuse:.1}, {gloss:.1}, and together {both:.1}");
+        assert!(both < 0.85 * (diffuse + gloss), "{diffuse} {gloss} {both}");
     }
 
     /// A sphere of radius 1: an octahedron whose triangles are parted in four so many times.

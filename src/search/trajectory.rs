@@ -48,6 +48,7 @@ pub fn trajectory(
     let mut way = vec![Stop::from(original)];
     Descent {
         interval: &interval,
+        asks: true,
         guard: &guard,
         progress: &|_, _| {},
     }
