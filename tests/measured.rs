@@ -102,7 +102,7 @@ fn a_search_is_recorded_and_replayed_to_the_same_bytes() {
     place.measured(&["--record", "times.json"]);
     let written = ["a.lod.wgsl", "a.lod.toml"].map(|file| place.read(file));
     let report = place.report();
-    let mut recording = Recording::read(&place.0.join("times.json")).expect("it was written");
+    let recording = Recording::read(&place.0.join("times.json")).expect("it was written");
     assert!(recording.timings.len() > 3, "{}", recording.timings.len());
     assert!(report["timed"].as_u64() > Some(0), "{report}");
     fs::remove_dir_all(place.0.join("cache")).expect("it was kept");
@@ -128,7 +128,7 @@ fn a_search_is_recorded_and_replayed_to_the_same_bytes() {
         }
         recording
     };
-    recording = make("one", 0.3);
+    let recording = make("one", 0.3);
     for recording in [&recording, &make("another", 0.4)] {
         let file = place.0.join(format!("{}.json", recording.adapter));
         fs::write(file, recording.json()).expect("it can be written");

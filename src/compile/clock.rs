@@ -5,9 +5,11 @@
 //! ```
 
 use super::search::Ready;
+use super::textures::{self, Made};
 use super::{Recorded, Request, RunTime};
 use crate::emit::{self, EmitLevel, Form, Output};
 use crate::front::Source;
+use crate::scene::Scene;
 use crate::search::Level;
 use crate::time::clock::Clock;
 use crate::time::model::{Calibration, Model};
@@ -16,6 +18,7 @@ use crate::time::{Timing, TimingWarning, Verdict};
 use crate::{Diagnostic, Result};
 use lodc_passes::Shader;
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 #[cfg(feature = "gpu")]
 use super::Measuring;
@@ -27,6 +30,7 @@ use crate::time::store::{Cache, MOST};
 /// What times the variants of one shader in its scene.
 pub(super) struct Watch<'a> {
     source: &'a Source,
+    scene: &'a Scene,
     /// The hash of all that is drawn beside the variant.
     drawn: Key,
     adapters: Vec<String>,
@@ -65,10 +69,26 @@ struct Device<'a> {
     cache: Option<Cache>,
     /// All that was timed here.
     recording: Recording,
+    /// Where textures are handed over that were made for variants; it goes with this.
+    folder: PathBuf,
 }
 
-/// A text that is timed, and what `autoLOD` is in it.
-type Text = (String, Option<f64>);
+#[cfg(feature = "gpu")]
+impl Drop for Device<'_> {
+    fn drop(&mut self) {
+        // It is there only when a texture was made.
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// A text that is timed.
+struct Text {
+    text: String,
+    /// What `autoLOD` is in it, where it chooses by that.
+    auto_lod: Option<f64>,
+    /// The textures that were made for it.
+    made: Vec<Made>,
+}
 
 impl Ready {
     /// The clock that a request asks for; none where times are estimated. What keeps it from being used is a warning: the
@@ -83,6 +103,7 @@ impl Ready {
         };
         let watch = |adapters, taken| Watch {
             source: &self.source,
+            scene: &self.scene,
             drawn: self.drawn(),
             adapters,
             model,
@@ -139,6 +160,7 @@ impl Ready {
             measuring,
             cache,
             recording: Recording::new(&name),
+            folder: std::env::temp_dir().join(format!("lodc-{}", std::process::id())),
         })
     }
 
@@ -175,16 +197,18 @@ impl Watch<'_> {
     /// Times texts against the original at a distance; for each one timing for each adapter, or none at all.
     fn take(&mut self, texts: &[Option<Text>], distance: f64) -> Vec<Vec<Timing>> {
         let drawn = self.drawn.to_string();
-        let key = |(text, auto_lod): &Text, effort: &[u8]| {
-            let auto_lod = auto_lod.map_or([0; 8], f64::to_le_bytes);
+        let key = |text: &Text, effort: &[u8]| {
+            let auto_lod = text.auto_lod.map_or([0; 8], f64::to_le_bytes);
             let distance = distance.to_le_bytes();
-            Key::of([
+            let fixed = [
                 drawn.as_bytes(),
-                text.as_bytes(),
+                text.text.as_bytes(),
                 &auto_lod,
                 &distance,
                 effort,
-            ])
+            ];
+            let made = text.made.iter().map(|made| made.locked.hash.as_bytes());
+            Key::of(fixed.into_iter().chain(made))
         };
         let timings: Vec<Vec<Timing>> = match &mut self.taken {
             Taken::Recordings(recordings, _) => texts
@@ -232,10 +256,21 @@ impl Watch<'_> {
         else {
             return;
         };
+        let textures = emit::generated_textures(self.source, emitted, output.form);
+        let Ok(made) = textures.and_then(|textures| textures::make(self.scene, &textures)) else {
+            return;
+        };
+        let mut text = [Some(Text {
+            text,
+            auto_lod: None,
+            made,
+        })];
         for level in levels {
             if !level.timed.is_empty() {
-                let at = level.autolod;
-                let timed = self.take(&[Some((text.clone(), Some(at)))], level.distance);
+                if let [Some(text)] = &mut text {
+                    text.auto_lod = Some(level.autolod);
+                }
+                let timed = self.take(&text, level.distance);
                 level.branching = timed.into_iter().next().unwrap_or_default();
             }
         }
@@ -311,7 +346,7 @@ impl Watch<'_> {
     }
 
     /// The recording of what was timed here, and where it is to be written.
-    pub(super) fn recording(&self) -> Option<(std::path::PathBuf, String)> {
+    pub(super) fn recording(&self) -> Option<(PathBuf, String)> {
         match &self.taken {
             #[cfg(feature = "gpu")]
             Taken::Device(device) => {
@@ -335,14 +370,17 @@ impl Clock for Watch<'_> {
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>> {
         let mut texts = Vec::new();
         for shader in variants {
-            let text = match shader.made().next().is_none() {
-                true => emit::variant(self.source, shader).map_err(|error| error.message.clone()),
-                false => Err("levels with textures that were made for them".to_owned()),
-            };
+            let text = emit::variant(self.source, shader).and_then(|(text, textures)| {
+                Ok(Text {
+                    text,
+                    auto_lod: None,
+                    made: textures::make(self.scene, &textures)?,
+                })
+            });
             texts.push(match text {
-                Ok(text) => Some((text, None)),
-                Err(problem) => {
-                    self.problems.insert(problem);
+                Ok(text) => Some(text),
+                Err(error) => {
+                    self.problems.insert(error.message);
                     None
                 }
             });
@@ -353,6 +391,25 @@ impl Clock for Watch<'_> {
 
 #[cfg(feature = "gpu")]
 impl Device<'_> {
+    /// A text as the device is given it: what was made for it is in files.
+    fn variant(&self, text: &Text) -> std::io::Result<Variant> {
+        let mut made = Vec::new();
+        for Made { locked, bytes } in &text.made {
+            std::fs::create_dir_all(&self.folder)?;
+            let hash = locked.hash.trim_start_matches("blake3:");
+            let file = self.folder.join(hash);
+            if !file.exists() {
+                std::fs::write(&file, bytes)?;
+            }
+            made.push((locked.name.clone(), file));
+        }
+        Ok(Variant {
+            text: Some(text.text.clone()),
+            auto_lod: text.auto_lod,
+            made,
+        })
+    }
+
     fn take(
         &mut self,
         texts: &[Option<Text>],
@@ -373,13 +430,21 @@ impl Device<'_> {
         let missing: Vec<usize> = (0..texts.len())
             .filter(|&at| timings[at].is_none() && texts[at].is_some())
             .collect();
-        let variants: Vec<Variant> = (missing.iter())
-            .filter_map(|&at| texts[at].as_ref())
-            .map(|(text, auto_lod)| Variant {
-                text: Some(text.clone()),
-                auto_lod: *auto_lod,
-            })
-            .collect();
+        let mut variants = Vec::new();
+        for text in missing.iter().filter_map(|&at| texts[at].as_ref()) {
+            match self.variant(text) {
+                Ok(variant) => variants.push(variant),
+                Err(error) => {
+                    problems.insert(format!(
+                        "a texture cannot be written for the device: {error}"
+                    ));
+                    return timings
+                        .into_iter()
+                        .map(|timing| timing.into_iter().collect())
+                        .collect();
+                }
+            }
+        }
         if !variants.is_empty() {
             let effort = &self.measuring.effort;
             match self.worker.time(&self.subject, &variants, distance, effort) {

@@ -313,19 +313,20 @@ pub(crate) fn one_level(
     Ok((read, files))
 }
 
-/// A variant as a text of its own, to be drawn and timed.
+/// A variant as a text of its own, to be drawn and timed, and the textures that were made for it.
 ///
 /// # Errors
 /// As [`emit_as`].
 #[cfg(feature = "search")]
-pub(crate) fn variant(source: &Source, shader: &Shader) -> Result<String> {
+pub(crate) fn variant(source: &Source, shader: &Shader) -> Result<(String, Vec<GeneratedTexture>)> {
     let source = &*composed::composed(source)?;
     let level = EmitLevel {
         autolod: 1.0,
         says: "a variant".to_owned(),
         ..EmitLevel::original(shader.clone())
     };
-    level_alone(source, &[level], 1, "variant")
+    let Settled { levels, textures } = Settled::new(source, &[level], Form::Override);
+    Ok((level_alone(source, &levels, 1, "variant")?, textures))
 }
 
 /// The text of one level alone.

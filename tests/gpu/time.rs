@@ -22,7 +22,7 @@ fn rounds(count: u32) -> String {
 fn variant(text: String) -> Variant {
     Variant {
         text: Some(text),
-        auto_lod: None,
+        ..Variant::default()
     }
 }
 

@@ -41,7 +41,7 @@ fn a_child_draws_what_its_parent_would() {
     // A variant of it, by the same child, and one that is no shader.
     let variant = |text: String| Variant {
         text: Some(text),
-        auto_lod: None,
+        ..Variant::default()
     };
     let blue = variant(PLAIN.replace("0.5", "1.0"));
     let other = worker
@@ -71,7 +71,7 @@ fn a_picture_that_takes_too_long_is_given_up_and_the_next_one_is_drawn() {
         assert!(drawn.is_ok(), "{drawn:?}");
         let endless = Variant {
             text: Some(text.to_owned()),
-            auto_lod: None,
+            ..Variant::default()
         };
         // Mesa ends a loop after 65,535 rounds: that takes minutes for as many pixels as these.
         let many = Wanted {

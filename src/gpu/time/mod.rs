@@ -19,6 +19,7 @@ use super::entry::{Colour, Targets};
 use super::pass::{Drawing, Pass, Ready, Views as Images};
 use super::render::{Renderer, Stages};
 use crate::eval::draw::{DrawState, state_of};
+use crate::eval::machine::Bindings;
 use crate::eval::raster::Frame;
 use crate::scene::{Output, Scene};
 use crate::time::statistics::{Estimate, Round, drifts, floor, median, ratio, throttles};
@@ -27,6 +28,7 @@ use crate::{Diagnostic, Result};
 use canvas::{Canvas, Prepared, Views};
 use clock::{Clock, resolved};
 use naga::ScalarKind;
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 use tiles::{Part, Tiles};
 use wgpu::{Features, PipelineStatisticsTypes, TextureFormat};
@@ -55,6 +57,16 @@ pub struct Timed {
     pass: Pass,
     formats: Vec<Option<TextureFormat>>,
     compiled: Duration,
+    /// What it reads beside what the scene has.
+    more: Bindings,
+}
+
+impl Timed {
+    /// The same with textures that the scene does not have.
+    #[must_use]
+    pub fn with(self, more: Bindings) -> Self {
+        Self { more, ..self }
+    }
 }
 
 /// Where shaders are timed.
@@ -124,6 +136,7 @@ impl Renderer<'_> {
                 pass,
                 formats,
                 compiled: start.elapsed(),
+                more: Bindings::new(),
             })
         })
     }
@@ -191,7 +204,11 @@ impl Renderer<'_> {
         let prepared = gpu.guarded("drawing", || {
             let ready = frames.iter().map(|frame| {
                 let uploads = (*gpu, &mut *uploads);
-                timed.pass.ready(uploads, (frame, None), &Images::new())
+                let mut frame = Cow::Borrowed(frame);
+                if !timed.more.is_empty() {
+                    frame.to_mut().bindings.extend(timed.more.clone());
+                }
+                timed.pass.ready(uploads, (&frame, None), &Images::new())
             });
             let views: Vec<Ready> = ready.collect::<Result<_>>()?;
             Ok(Prepared {

@@ -89,6 +89,9 @@ pub struct Variant {
     pub text: Option<String>,
     /// What `autoLOD` is, where the text has such an override constant.
     pub auto_lod: Option<f64>,
+    /// The textures that were made for the text: the names of their variables, and their files. They are bound where it is
+    /// timed; a picture is drawn without them.
+    pub made: Vec<(String, PathBuf)>,
 }
 
 /// Which picture.
@@ -232,6 +235,7 @@ mod tests {
                 variant: Variant {
                     text: Some("fn é() {}".to_owned()),
                     auto_lod: Some(0.1),
+                    made: vec![("loctx_0".to_owned(), "a.png".into())],
                 },
                 wanted: Wanted {
                     distance: 2.5,

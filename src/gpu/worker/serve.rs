@@ -4,6 +4,8 @@ use super::{
     Answer, Request, Said, Subject, Task, Variant, Wanted, read_message, write_message,
     write_numbers,
 };
+use crate::eval::generated;
+use crate::eval::machine::{Bindings, Resource};
 use crate::front::Source;
 use crate::gpu::time::{Place, Timed};
 use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
@@ -181,6 +183,30 @@ impl<'g> Loaded<'g> {
         compile(&self.renderer, stages, &self.scene)
     }
 
+    /// A variant compiled for being timed, with the textures that were made for it.
+    fn timed(&self, variant: &Variant) -> Result<Timed> {
+        let timed = self.compiled(variant, Renderer::timed)?;
+        let Some(text) = variant.text.as_ref().filter(|_| !variant.made.is_empty()) else {
+            return Ok(timed);
+        };
+        let source = Source::parse("variant.wgsl", &**text)?;
+        let mut more = Bindings::new();
+        for (name, file) in &variant.made {
+            let mut declared = source.module.global_variables.iter();
+            let declared = declared.find(|(_, declared)| declared.name.as_ref() == Some(name));
+            let binding = declared.and_then(|(_, declared)| declared.binding);
+            let shown = file.display().to_string();
+            let bytes = std::fs::read(file).map_err(|error| {
+                Diagnostic::error(format!("cannot read the texture `{shown}`")).with_reason(error)
+            })?;
+            if let Some(at) = binding {
+                let texture = Arc::new(generated::read(&shown, &bytes)?);
+                more.insert((at.group, at.binding), Resource::Texture(texture));
+            }
+        }
+        Ok(timed.with(more))
+    }
+
     fn stages<'a>(&'a self, source: &'a Source) -> Result<Stages<'a>> {
         Stages::of_source(source, &self.scene).ok_or_else(|| {
             Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
@@ -260,7 +286,7 @@ fn time(
         let known = kept.iter().position(|(v, _)| v == variant);
         let compiled = match known {
             Some(at) => Ok(kept.remove(at).1),
-            None => loaded.compiled(variant, Renderer::timed),
+            None => loaded.timed(variant),
         };
         failed.push(match compiled {
             Ok(timed) => {
