@@ -141,7 +141,7 @@ fn main() {
     let mut worker = Worker::new(program, Some(label.to_string()), Duration::from_secs(120));
     let variants = [2000, 2400].map(|rounds| Variant {
         text: Some(shader(rounds)),
-        auto_lod: None,
+        ..Variant::default()
     });
     let effort = Effort {
         half_width: 0.02,

@@ -277,6 +277,7 @@ impl Watch<'_> {
     }
 
     /// What should be known: levels whose gain the branch eats, and what could not be timed.
+    #[allow(clippy::vec_box, reason = "as diagnostics are handed around")]
     pub(super) fn warnings(&self, levels: &[Level]) -> Vec<Box<Diagnostic>> {
         let mut warnings = Vec::new();
         let eaten = levels.iter().enumerate().filter(|(_, level)| {

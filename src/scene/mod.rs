@@ -680,7 +680,7 @@ fn opaque(
 }
 
 /// What fills the uniforms that a shader fills itself.
-fn filled(source: &Source) -> Result<Vec<Arc<ParameterStage>>> {
+pub(crate) fn filled(source: &Source) -> Result<Vec<Arc<ParameterStage>>> {
     let mut stages = Vec::new();
     for filled in source.filled() {
         let stage = ParameterStage::of_text(&source.module, &filled);

@@ -20,6 +20,7 @@ use super::pass::{Drawing, Pass, Ready, Views as Images};
 use super::render::{Renderer, Stages};
 use crate::eval::draw::{DrawState, state_of};
 use crate::eval::machine::Bindings;
+use crate::eval::parameters::ParameterStage;
 use crate::eval::raster::Frame;
 use crate::scene::{Output, Scene};
 use crate::time::statistics::{Estimate, Round, drifts, floor, median, ratio, throttles};
@@ -29,6 +30,7 @@ use canvas::{Canvas, Prepared, Views};
 use clock::{Clock, resolved};
 use naga::ScalarKind;
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tiles::{Part, Tiles};
 use wgpu::{Features, PipelineStatisticsTypes, TextureFormat};
@@ -57,15 +59,21 @@ pub struct Timed {
     pass: Pass,
     formats: Vec<Option<TextureFormat>>,
     compiled: Duration,
-    /// What it reads beside what the scene has.
+    /// What it reads beside what the scene has, the same in every frame.
     more: Bindings,
+    /// What fills its block of parameters.
+    filled: Vec<Arc<ParameterStage>>,
 }
 
 impl Timed {
-    /// The same with textures that the scene does not have.
+    /// The same with textures that the scene does not have, and with what fills blocks of parameters.
     #[must_use]
-    pub fn with(self, more: Bindings) -> Self {
-        Self { more, ..self }
+    pub(super) fn with(self, more: Bindings, filled: Vec<Arc<ParameterStage>>) -> Self {
+        Self {
+            more,
+            filled,
+            ..self
+        }
     }
 }
 
@@ -137,6 +145,7 @@ impl Renderer<'_> {
                 formats,
                 compiled: start.elapsed(),
                 more: Bindings::new(),
+                filled: Vec::new(),
             })
         })
     }
@@ -207,6 +216,10 @@ impl Renderer<'_> {
                 let mut frame = Cow::Borrowed(frame);
                 if !timed.more.is_empty() {
                     frame.to_mut().bindings.extend(timed.more.clone());
+                }
+                let draws = frame.mesh.draws().len();
+                for stage in &timed.filled {
+                    stage.bind(&mut frame.to_mut().bindings, draws);
                 }
                 timed.pass.ready(uploads, (&frame, None), &Images::new())
             });

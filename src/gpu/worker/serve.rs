@@ -9,7 +9,7 @@ use crate::eval::machine::{Bindings, Resource};
 use crate::front::Source;
 use crate::gpu::time::{Place, Timed};
 use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
-use crate::scene::Scene;
+use crate::scene::{Scene, filled};
 use crate::time::Effort;
 use crate::{Diagnostic, Result};
 use std::io::{Read, Write};
@@ -183,10 +183,10 @@ impl<'g> Loaded<'g> {
         compile(&self.renderer, stages, &self.scene)
     }
 
-    /// A variant compiled for being timed, with the textures that were made for it.
+    /// A variant compiled for being timed, with the textures that were made for it and what fills its parameters.
     fn timed(&self, variant: &Variant) -> Result<Timed> {
         let timed = self.compiled(variant, Renderer::timed)?;
-        let Some(text) = variant.text.as_ref().filter(|_| !variant.made.is_empty()) else {
+        let Some(text) = &variant.text else {
             return Ok(timed);
         };
         let source = Source::parse("variant.wgsl", &**text)?;
@@ -204,7 +204,7 @@ impl<'g> Loaded<'g> {
                 more.insert((at.group, at.binding), Resource::Texture(texture));
             }
         }
-        Ok(timed.with(more))
+        Ok(timed.with(more, filled(&source)?))
     }
 
     fn stages<'a>(&'a self, source: &'a Source) -> Result<Stages<'a>> {
