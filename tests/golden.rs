@@ -213,6 +213,9 @@ fn facts(shader: &Shader, text: &str) -> Result<Facts, String> {
                     numbers: (0..basis.count())
                         .map(|i| [0.5_f32.powi(1 + i as i32); 4])
                         .collect(),
+                    lobes: (0..basis.lights())
+                        .map(|i| std::array::from_fn(|c| if i == c { 8.0 } else { 0.0 }))
+                        .collect(),
                     left: 0.125,
                 });
                 facts

@@ -3,7 +3,7 @@
 //! Facts are data. Passes read them when they list candidates and bake what they use into the
 //! candidate, so that a recipe replays without them.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Lobe};
 use crate::recipe::Declined;
 use crate::shader::ValueId;
 use std::collections::{BTreeMap, BTreeSet};
@@ -219,6 +219,8 @@ pub struct Fit {
     pub basis: Basis,
     /// What each of them is multiplied with, for each channel.
     pub numbers: Vec<[f32; 4]>,
+    /// Where its lights are.
+    pub lobes: Vec<Lobe>,
     /// The part of the texture's variance that it leaves, 0..=1.
     pub left: f64,
 }

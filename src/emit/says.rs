@@ -66,6 +66,7 @@ fn clauses(pass: &str, candidates: &[&Candidate], entry_point: &str) -> Vec<Stri
             Some(("normal-to-roughness", _)) => widened.push(site),
             Some(("same" | "levels" | "resampled" | "bake", _)) => baked.push(site),
             Some(("harmonics", _)) => smooth.push(format!("{site} replaced by harmonics")),
+            Some(("lights", _)) => smooth.push(format!("{site} replaced by lights")),
             Some(("polynomial", _)) => smooth.push(format!("{site} replaced by a polynomial")),
             None if pass == "vertex-motion" => moved.push(site),
             None if candidate.choice == "exact" => per_draw.push(site),

@@ -411,6 +411,11 @@ mod tests {
         let scene = std::fs::read_to_string(path.with_extension("toml")).expect("it is there");
         let [mean, sum] = added(&path, &small(&scene), 0.5, "harmonics");
         assert!(sum[1] < 0.75 * mean[1].min(mean[0]), "{mean:?} {sum:?}");
+        let [_, lights] = added(&path, &small(&scene), 0.5, "lights");
+        assert!(
+            lights[1] < 0.75 * mean[1].min(mean[0]),
+            "{mean:?} {lights:?}"
+        );
     }
 
     #[test]

@@ -93,6 +93,7 @@ fn autolod_is_set_whether_it_is_an_override_or_in_a_buffer() {
         let all = [1.0, 3.0].map(|auto_lod| Variant {
             text: Some(format!("{declaration}\n{text}")),
             auto_lod: Some(auto_lod),
+            ..Variant::default()
         });
         let timed = worker.time(&subject, &all, 4.0, &QUICK);
         let timed = timed.unwrap_or_else(|failure| panic!("{failure:?}"));

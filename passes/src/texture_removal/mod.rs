@@ -22,10 +22,11 @@
 //! like those of a microfacet, most are flat with some steep edges, which a lobe had better not follow; and a
 //! shader may scale its normals. So a search judges this choice by its best numbers.
 //!
-//! `polynomial D` and `harmonics D`, for a texture that is smooth: a sample becomes a sum of functions of its
+//! `polynomial D`, `harmonics D` and `lights N`, for a texture that is smooth: a sample becomes a sum of functions of its
 //! coordinates, of a degree or band up to D, and never below 0. A polynomial takes the place of a texture of two dimensions,
 //! such as a table of a reflectance over two arguments; harmonics take that of a cube map, such as surroundings that light a
-//! rough surface. The candidate bakes the factors, function by function, of the components that are used. They are those
+//! rough surface; lights are the first band of these and up to four lobes, at the peaks of what that leaves of the map. The candidate bakes the factors, function by function, of the components that are used, and behind them a vector for each light,
+//! whose length is how narrow it is. They are those
 //! that are nearest to the texture at first, and then those that leave the least error on the screen, which needs no
 //! window against ringing: what rings is an error.
 //!
@@ -45,7 +46,8 @@
 //!   output or what is written to memory.
 //! - A read that no sample saw, for `seen-mean`.
 //! - `polynomial` for coordinates that are seen outside 0..1, both sums for what is seen below 0. They are not thought of for
-//!   textures of which they would leave most of the variance, and for reads other than plain samples.
+//!   textures of which they would leave most of the variance, or more than 0.9 of what a sum of less work leaves, and for
+//!   reads other than plain samples. A sum that costs as much as the sample is declined.
 //! - `normal-to-roughness` where alpha is not known for sure or seen above 1, where it and the normals are not two
 //!   things that meet further on, where it decides more than the picture, and for normals that do not vary. It is not
 //!   thought of for other textures.

@@ -1,12 +1,14 @@
 //! A smooth texture as a short sum of functions of its coordinates.
 
+use crate::Facts;
+use crate::basis::{Basis, Lobe};
+use crate::cost::SAMPLE_WEIGHT;
 use crate::edit::{Edit, floats};
 use crate::facts::{Fit, TextureFacts, ValueFacts};
 use crate::flow::{Flow, Value};
 use crate::operands::User;
 use crate::recipe::{Candidate, Declined};
 use crate::shader::{Shader, Stage};
-use crate::{Facts, basis::Basis};
 use naga::{BinaryOperator, Expression, MathFunction};
 
 /// The part of a texture's variance that a fit may leave, above which the mean does nearly as well, for less; and the part of
@@ -15,9 +17,12 @@ use naga::{BinaryOperator, Expression, MathFunction};
 fn limits(basis: Basis) -> (f64, f64) {
     match basis {
         Basis::Polynomial(_) => (0.5, 0.7),
-        Basis::Harmonics(_) => (0.9, 0.9),
+        Basis::Harmonics(_) | Basis::Lights(_) => (0.9, 0.9),
     }
 }
+
+/// How many numbers say where a light is; they stand behind the factors.
+const LOBE: usize = 3;
 
 /// A sum as a candidate bakes it.
 pub(super) struct Sum {
@@ -26,6 +31,8 @@ pub(super) struct Sum {
     coordinates: Value,
     /// For each function its numbers, one for each component that is used.
     numbers: Vec<Vec<f32>>,
+    /// Where its lights are.
+    lobes: Vec<Lobe>,
     /// How many components the read returns.
     returned: usize,
 }
@@ -40,12 +47,16 @@ impl Sum {
     ) -> Result<Self, Declined> {
         let coordinates = coordinates(flow, read, basis)?;
         let used = used(flow, read);
-        let numbers = candidate.baked(basis.count() * used)?;
+        let factors = basis.count() * used;
+        let numbers = candidate.baked(factors + LOBE * basis.lights())?;
+        let (factors, lobes) = numbers.split_at(factors);
+        let (lobes, _) = lobes.as_chunks::<LOBE>();
         Ok(Self {
             read,
             basis,
             coordinates,
-            numbers: numbers.chunks(used).map(<[f32]>::to_vec).collect(),
+            numbers: factors.chunks(used).map(<[f32]>::to_vec).collect(),
+            lobes: lobes.to_vec(),
             returned: flow.floats(read).unwrap_or(used),
         })
     }
@@ -53,7 +64,7 @@ impl Sum {
     /// Adds the values that compute it, and gives the last one.
     pub(super) fn write(&self, shader: &Shader, edit: &mut Edit) -> Value {
         let path = format!("{}.smooth", shader.id(Stage::Fragment, self.read).path());
-        let functions = self.basis.write(edit, &path, self.coordinates);
+        let functions = self.basis.write(edit, &path, self.coordinates, &self.lobes);
         let binary = |op, left, right| Expression::Binary { op, left, right };
         let mut sum = edit.add_numbers(&path, &self.numbers[0]);
         for (function, numbers) in functions.into_iter().zip(&self.numbers[1..]) {
@@ -105,6 +116,11 @@ pub(super) fn listed(
         if fit.left > most.min(better * simpler) || coordinates(flow, read, fit.basis).is_err() {
             continue;
         }
+        if fit.basis.work(used(flow, read)) >= SAMPLE_WEIGHT {
+            let why = "it would cost as much as the sample".into();
+            found.push((fit.basis, Err(Declined(why))));
+            continue;
+        }
         simpler = fit.left;
         found.push((fit.basis, numbers(flow, facts, fit, read)));
     }
@@ -134,6 +150,7 @@ fn numbers(flow: &Flow, facts: &Facts, fit: &Fit, read: Value) -> Result<Vec<f32
         .numbers
         .iter()
         .flat_map(|of_function| of_function[..used].to_vec());
+    let numbers = numbers.chain(fit.lobes.iter().flatten().copied());
     let numbers: Vec<f32> = numbers.collect();
     match numbers.iter().all(|number| number.is_finite()) {
         true => Ok(numbers),
