@@ -18,7 +18,7 @@ use crate::time::{Timing, TimingWarning, Verdict};
 use crate::{Diagnostic, Result};
 use lodc_passes::Shader;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[cfg(feature = "gpu")]
 use super::Measuring;
@@ -245,35 +245,51 @@ impl Watch<'_> {
             form: Form::Uniform,
             ..Output::default()
         };
-        let Some(text) = emit::emit_as(self.source, base, emitted, output, "variant")
-            .ok()
-            .and_then(|files| {
-                let mut files = files.into_iter();
-                let (_, bytes) =
-                    files.find(|(name, _)| name.extension().is_some_and(|e| e == "wgsl"))?;
-                String::from_utf8(bytes).ok()
-            })
-        else {
-            return;
-        };
-        let textures = emit::generated_textures(self.source, emitted, output.form);
-        let Ok(made) = textures.and_then(|textures| textures::make(self.scene, &textures)) else {
-            return;
-        };
-        let mut text = [Some(Text {
-            text,
-            auto_lod: None,
-            made,
-        })];
-        for level in levels {
-            if !level.timed.is_empty() {
-                if let [Some(text)] = &mut text {
-                    text.auto_lod = Some(level.autolod);
-                }
-                let timed = self.take(&text, level.distance);
-                level.branching = timed.into_iter().next().unwrap_or_default();
-            }
+        let timed = levels.iter_mut().filter(|level| !level.timed.is_empty());
+        let timed: Vec<&mut Level> = timed.collect();
+        let at: Vec<(f64, f64)> = (timed.iter())
+            .map(|level| (level.autolod, level.distance))
+            .collect();
+        let whole = self.whole((base, emitted), output, &at);
+        for (level, timings) in timed.into_iter().zip(whole) {
+            level.branching = timings;
         }
+    }
+
+    /// Times the text that holds all levels at values of autoLOD and distances; nothing where there is no such text.
+    pub(super) fn whole(
+        &mut self,
+        (base, emitted): (&Shader, &[EmitLevel]),
+        output: Output,
+        at: &[(f64, f64)],
+    ) -> Vec<Vec<Timing>> {
+        let text = emit::emit_as(self.source, base, emitted, output, "variant").and_then(|files| {
+            let mut files = files.into_iter();
+            let is_shader = |name: &Path| name.extension().is_some_and(|e| e == "wgsl");
+            let text = files.find(|(name, _)| is_shader(name));
+            let text = text.and_then(|(_, bytes)| String::from_utf8(bytes).ok());
+            let textures = emit::generated_textures(self.source, emitted, output.form)?;
+            Ok(Text {
+                text: text.unwrap_or_default(),
+                auto_lod: None,
+                made: textures::make(self.scene, &textures)?,
+            })
+        });
+        let mut text = match text {
+            Ok(text) => [Some(text)],
+            Err(error) => {
+                self.problems.insert(error.message);
+                return Vec::new();
+            }
+        };
+        let mut timings = Vec::new();
+        for (auto_lod, distance) in at {
+            if let [Some(text)] = &mut text {
+                text.auto_lod = Some(*auto_lod);
+            }
+            timings.extend(self.take(&text, *distance));
+        }
+        timings
     }
 
     /// What should be known: levels whose gain the branch eats, and what could not be timed.

@@ -235,6 +235,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .collect();
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
+    let transitions = ready.transitions(&vertex, &found, &levels, emission, watch.as_mut())?;
     let mut of_time: Vec<Box<Diagnostic>> = untimed.into_iter().collect();
     if let Some(watch) = &mut watch {
         watch.branches(&ready.base, &mut found.levels, &levels);
@@ -242,7 +243,6 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         let recording = watch.recording();
         files.extend(recording.map(|(file, text)| (file, text.into_bytes())));
     }
-    let transitions = ready.transitions(&vertex, &found, &levels, emission)?;
     let textures = emit::generated_textures(&ready.source, &levels, emission.form)?;
     let made = textures::make(&ready.scene, &textures)?;
     let generated: Vec<LockedGenerated> = made.iter().map(|made| made.locked.clone()).collect();

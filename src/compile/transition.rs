@@ -1,12 +1,13 @@
 //! What transitions cost: the text that is written, drawn in the middle of each band.
 
+use super::clock::Watch;
 use super::normal_form;
 use super::search::{Ready, vertex_program};
 use crate::Result;
 use crate::emit::{self, EmitLevel, Output, Transition, figure};
 use crate::eval::program::Program;
 use crate::eval::refusal;
-use crate::report::TransitionReport;
+use crate::report::{RatioReport, TransitionReport};
 use crate::scene::Scene;
 use crate::search::{Found, SampleSet, Samples, Stand};
 use lodc_passes::autolod;
@@ -20,6 +21,7 @@ impl Ready {
         found: &Found,
         levels: &[EmitLevel],
         output: Output,
+        mut watch: Option<&mut Watch<'_>>,
     ) -> Result<Vec<Option<TransitionReport>>> {
         let mut transitions = vec![None; found.levels.len()];
         if output.transition == Transition::Pop || levels.is_empty() {
@@ -33,10 +35,6 @@ impl Ready {
         let (_, mut scene) = Scene::read_both(&self.source, &emitted, self.scene_file.as_deref())?;
         let base = normal_form(&emitted)?;
         let own = vertex_program(&scene, &base).map_err(|refused| refusal(&refused, &emitted))?;
-        // A block of parameters is filled by another stage of the text, which is not drawn here.
-        let is_known = levels
-            .iter()
-            .all(|level| level.shader.parameters().is_empty());
         for (place, (at, _)) in found.written().enumerate() {
             let Some(until) = emit::band_end(levels, place, output) else {
                 continue;
@@ -69,11 +67,19 @@ impl Ready {
             let moved = [at.checked_sub(1), Some(at)].into_iter().flatten();
             let moved: f64 = moved.map(|of| found.levels[of].used.work.moved).sum();
             let cost = (drawn.used.work.total() + moved) / original.original().used.work.total();
+            let timed = match &mut watch {
+                Some(watch) => watch.whole((&self.base, levels), output, &[(middle, distance)]),
+                None => Vec::new(),
+            };
+            let timed = timed.into_iter().flatten();
             transitions[at] = Some(TransitionReport {
                 kind: output.transition.name(),
                 from: f64::from(from),
                 until: f64::from(until),
-                cost: is_known.then(|| figure(cost)),
+                cost: Some(figure(cost)),
+                time: timed
+                    .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+                    .map(|timing| RatioReport::of(&timing)),
             });
         }
         Ok(transitions)

@@ -211,8 +211,10 @@ pub struct TransitionReport {
     pub from: f64,
     /// The autoLOD from which the level is drawn alone.
     pub until: f64,
-    /// What is paid in between, as a share of the original's estimated time; null when it is not known.
+    /// What is paid in between, as a share of the original's estimated time.
     pub cost: Option<f64>,
+    /// The run time in the middle of the band, where it was measured; of several adapters where it is worst.
+    pub time: Option<RatioReport>,
 }
 
 /// The run time of a level.
@@ -238,14 +240,14 @@ pub struct TimeReport {
     pub warnings: Vec<TimingWarning>,
     /// The ratio, its interval and what is said of it where the text that holds all levels branches by a uniform, when
     /// that was timed.
-    pub branching: Option<BranchingReport>,
+    pub branching: Option<RatioReport>,
     /// The same of the other adapters, where recordings of several stand in.
     pub others: Vec<TimeReport>,
 }
 
-/// The run time of a level in the text that holds all levels and branches, as a share of the original's alone.
+/// A run time of the text that holds all levels, as a share of the original's alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BranchingReport {
+pub struct RatioReport {
     /// The ratio.
     pub ratio: f64,
     /// Lower end of its interval.
@@ -254,6 +256,18 @@ pub struct BranchingReport {
     pub high: f64,
     /// What can be said of it.
     pub verdict: Verdict,
+}
+
+impl RatioReport {
+    /// What was measured.
+    pub(crate) fn of(timing: &Timing) -> Self {
+        Self {
+            ratio: timing.ratio,
+            low: timing.low,
+            high: timing.high,
+            verdict: timing.verdict(),
+        }
+    }
 }
 
 impl TimeReport {
@@ -285,12 +299,7 @@ impl TimeReport {
             floor: Some(timing.floor),
             verdict: Some(timing.verdict()),
             warnings: timing.warnings.clone(),
-            branching: branching.map(|branching| BranchingReport {
-                ratio: branching.ratio,
-                low: branching.low,
-                high: branching.high,
-                verdict: branching.verdict(),
-            }),
+            branching: branching.map(RatioReport::of),
             others: Vec::new(),
         }
     }

@@ -252,8 +252,10 @@ fn transitions(report: &Report) -> String {
             let cost = transition
                 .cost
                 .map_or("unknown".to_owned(), |cost| format!("{cost:.2}"));
+            let time = transition.time.as_ref();
+            let time = time.map_or_else(String::new, |time| format!(", time {:.3}", time.ratio));
             Some(format!(
-                "{} into level {i} until {:.2}, cost {cost}",
+                "{} into level {i} until {:.2}, cost {cost}{time}",
                 transition.kind, transition.until
             ))
         })
