@@ -4,11 +4,8 @@ struct Light { at: vec3f, reach: f32, colour: vec3f }
 @group(0) @binding(0) var<uniform> lights: array<Light, 4>;
 @group(0) @binding(1) var<uniform> count: u32;
 
-@vertex fn vs_main(@location(0) position: vec3f, @location(1) normal: vec3f) -> Surface {
-    return Surface(vec4f(position, 1.0), position, normal);
-}
+@vertex fn vs_main(@location(0) position: vec3f, @location(1) normal: vec3f) -> Surface { return Surface(vec4f(position, 1.0), position, normal); }
 struct Surface { @builtin(position) clip: vec4f, @location(0) at: vec3f, @location(1) normal: vec3f }
-
 @fragment fn fs_main(in: Surface) -> @location(0) vec4f {
     var colour = vec3f();
     var behind = 1.0;
