@@ -6,7 +6,7 @@
 //!
 //! Effect. All that computes the value is copied to the parameter stage, which stores it in the block (see
 //! [`crate::parameters`]); the users of the site read it there. Loops and branches are copied with the variables that they
-//! work on. What several moved values share is computed once, a loop that they need as well (see [`crate::lockstep`]).
+//! work on. What several moved values share is computed once, a loop that they need as well (see `lockstep`).
 //! - `exact`: nothing but uniforms and constants is in it. The largest such values are offered, as far as they do some work.
 //! - `average <ids>`: the largest values in it that no uniform is in become constants, which the candidate carries, at
 //!   first their means over the samples; a search finds better ones. Uniforms stay what they are, so that the level follows

@@ -5,7 +5,7 @@
 //!
 //! Effect. All that computes the value is copied to the end of the vertex stage, which hands the value over as another
 //! output; the users of the site use that input. Loops and branches are copied with the variables that they work on. What
-//! several moved values share is computed once, a loop that they need as well (see [`crate::lockstep`]). A texture is read
+//! several moved values share is computed once, a loop that they need as well (see `lockstep`). A texture is read
 //! with an explicit level there, which the candidate carries for each read whose level was implicit: at first the level
 //! that the distance leads to; a search finds better ones.
 //! - `flat`: it is the same for a whole triangle, and is handed over as it is.

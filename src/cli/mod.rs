@@ -1,7 +1,7 @@
 //! The command line: arguments in, messages and an exit code out. All work is the library's.
 
-#[cfg(feature = "gpu")]
 mod calibrate;
+#[cfg(feature = "gpu")]
 mod child;
 mod progress;
 

@@ -22,7 +22,8 @@ mod vertices;
 pub(crate) use quads::Quad;
 pub(crate) use shape::{Shape, shape};
 #[cfg(feature = "gpu")]
-pub(crate) use vertices::{attribute, hand_over_the_same, profile as vertex_profile};
+pub(crate) use vertices::attribute;
+pub(crate) use vertices::{hand_over_the_same, profile as vertex_profile};
 
 use super::draw::{Blend, DrawState, state_of};
 use super::generated::Store;
