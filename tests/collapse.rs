@@ -4,7 +4,7 @@
 mod fixtures;
 
 use fixtures::Goldens;
-use lodc::compile::{self, CompareRequest, Request, normal_form};
+use lodc::compile::{self, CompareRequest, Compared, Request, normal_form};
 use lodc::emit::{self, EmitLevel, Form, Output, write_atomically};
 use lodc::eval::generated::{GeneratedTextures, Store, TexelFormat};
 use lodc::eval::lane::{LANES, Mask};
@@ -21,6 +21,16 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// What the main job wrote, against the original.
+fn compared(original: Request, other: PathBuf) -> lodc::Result<Compared> {
+    let asked = CompareRequest {
+        original,
+        other,
+        ..CompareRequest::default()
+    };
+    compile::compare(&asked, &|| {})
+}
 
 #[test]
 fn the_example_of_the_paper_becomes_one_constant_in_his_steps() {
@@ -492,14 +502,7 @@ fn what_is_written_of_random_expressions_has_the_errors_that_are_reported() {
             .iter()
             .filter(|(file, _)| file.starts_with(folder.join("random.lod")))
             .count();
-        let compared = compile::compare(
-            &CompareRequest {
-                original: request,
-                other: folder.join("random.lod.wgsl"),
-                ..CompareRequest::default()
-            },
-            &|| {},
-        );
+        let compared = compared(request, folder.join("random.lod.wgsl"));
         let compared = compared.unwrap_or_else(|e| panic!("{e}\n{text}"));
         for level in &compiled.report.levels {
             let mut at = compared.comparison.distances.iter();
@@ -616,14 +619,7 @@ fn textures_become_files_that_the_lock_makes_again() {
         );
     }
     // What is emitted draws what was measured, with the textures that were written.
-    let compared = compile::compare(
-        &CompareRequest {
-            original: request.clone(),
-            other: folder.join("silk.lod.wgsl"),
-            ..CompareRequest::default()
-        },
-        &|| {},
-    );
+    let compared = compared(request.clone(), folder.join("silk.lod.wgsl"));
     let compared = compared.unwrap_or_else(|e| panic!("{e}"));
     assert!(compared.warnings.is_empty(), "{:?}", compared.warnings);
     for level in &compiled.report.levels {
@@ -696,14 +692,7 @@ fn arrays_become_files_of_all_their_layers() {
             file.display()
         );
     }
-    let compared = compile::compare(
-        &CompareRequest {
-            original: request.clone(),
-            other: folder.join("tiles.lod.wgsl"),
-            ..CompareRequest::default()
-        },
-        &|| {},
-    );
+    let compared = compared(request.clone(), folder.join("tiles.lod.wgsl"));
     let compared = compared.unwrap_or_else(|e| panic!("{e}"));
     for level in &compiled.report.levels {
         let mut at = compared.comparison.distances.iter();

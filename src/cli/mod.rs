@@ -272,16 +272,8 @@ struct TimeArgs {
     /// Where run times come from, by which levels are chosen [default: estimated]
     #[arg(long, value_enum)]
     time: Option<TimeWord>,
-    /// The GPU that variants are timed on: words of its name [default: the best]
-    #[cfg(feature = "gpu")]
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
-    /// How long the timing of a variant may take; it ends sooner when it is exact to 1 % [default: 2]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    time_budget: Option<Duration>,
-    /// Times everything anew, and keeps nothing
-    #[arg(long)]
-    no_cache: bool,
+    #[command(flatten)]
+    measuring: MeasuringArgs,
     /// Writes all timings to a file, which stands in for the adapter with --recordings
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -292,6 +284,44 @@ struct TimeArgs {
     /// worst
     #[arg(long, value_name = "FILES", num_args = 1.., conflicts_with_all = ["time_budget", "no_cache", "record"])]
     recordings: Vec<PathBuf>,
+}
+
+/// How variants are timed on a device.
+#[derive(Debug, Args)]
+struct MeasuringArgs {
+    /// The GPU that variants are timed on: words of its name [default: the best]
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// How long the timing of a variant may take; it ends sooner when it is exact to 1 % [default: 2]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_budget: Option<Duration>,
+    /// Times everything anew, and keeps nothing
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl MeasuringArgs {
+    fn measuring(self, record: Option<PathBuf>) -> Result<Measuring> {
+        let program = std::env::current_exe().map_err(|error| {
+            Diagnostic::error("lodc cannot find its own file, which draws in a process of its own")
+                .with_reason(error)
+        })?;
+        let effort = Effort::default();
+        Ok(Measuring {
+            program,
+            #[cfg(feature = "gpu")]
+            adapter: self.adapter,
+            #[cfg(not(feature = "gpu"))]
+            adapter: None,
+            cache: cache_folder().filter(|_| !self.no_cache),
+            record,
+            effort: Effort {
+                budget: self.time_budget.unwrap_or(effort.budget),
+                ..effort
+            },
+        })
+    }
 }
 
 /// Where run times come from.
@@ -346,12 +376,12 @@ impl TimeArgs {
         }
         if self.time != Some(TimeWord::Measured) {
             let given = [
-                ("--time-budget", self.time_budget.is_some()),
-                ("--no-cache", self.no_cache),
+                ("--time-budget", self.measuring.time_budget.is_some()),
+                ("--no-cache", self.measuring.no_cache),
                 ("--record", self.record.is_some()),
                 ("--model", self.model.is_some()),
                 #[cfg(feature = "gpu")]
-                ("--adapter", self.adapter.is_some()),
+                ("--adapter", self.measuring.adapter.is_some()),
             ];
             return match given.into_iter().find(|(_, given)| *given) {
                 None => Ok(RunTime::Estimated),
@@ -361,24 +391,7 @@ impl TimeArgs {
                 .with_note("add `--time measured`")),
             };
         }
-        let program = std::env::current_exe().map_err(|error| {
-            Diagnostic::error("lodc cannot find its own file, which draws in a process of its own")
-                .with_reason(error)
-        })?;
-        let effort = Effort::default();
-        Ok(RunTime::Measured(Measuring {
-            program,
-            #[cfg(feature = "gpu")]
-            adapter: self.adapter,
-            #[cfg(not(feature = "gpu"))]
-            adapter: None,
-            cache: cache_folder().filter(|_| !self.no_cache),
-            record: self.record,
-            effort: Effort {
-                budget: self.time_budget.unwrap_or(effort.budget),
-                ..effort
-            },
-        }))
+        Ok(RunTime::Measured(self.measuring.measuring(self.record)?))
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) struct Watch<'a> {
     adapters: Vec<String>,
     /// What ranks variants before they are timed.
     model: Model,
-    taken: Taken<'a>,
+    taken: Taken,
     /// What was timed, and where it was found.
     pub(super) counts: Timings,
     /// What could not be timed, said once each.
@@ -55,17 +55,17 @@ pub struct Timings {
 }
 
 /// Where timings come from.
-enum Taken<'a> {
+enum Taken {
     #[cfg(feature = "gpu")]
-    Device(Box<Device<'a>>),
-    Recordings(Vec<Recording>, std::marker::PhantomData<&'a ()>),
+    Device(Box<Device>),
+    Recordings(Vec<Recording>),
 }
 
 #[cfg(feature = "gpu")]
-struct Device<'a> {
+struct Device {
     worker: Worker,
     subject: Subject,
-    measuring: &'a Measuring,
+    measuring: Measuring,
     cache: Option<Cache>,
     /// All that was timed here.
     recording: Recording,
@@ -74,7 +74,7 @@ struct Device<'a> {
 }
 
 #[cfg(feature = "gpu")]
-impl Drop for Device<'_> {
+impl Drop for Device {
     fn drop(&mut self) {
         // It is there only when a texture was made.
         let _ = std::fs::remove_dir_all(&self.folder);
@@ -93,10 +93,10 @@ struct Text {
 impl Ready {
     /// The clock that a request asks for; none where times are estimated. What keeps it from being used is a warning: the
     /// search goes on with estimates.
-    pub(super) fn watch<'a>(
-        &'a self,
-        request: &'a Request,
-    ) -> Result<std::result::Result<Option<Watch<'a>>, Box<Diagnostic>>> {
+    pub(super) fn watch(
+        &self,
+        request: &Request,
+    ) -> Result<std::result::Result<Option<Watch<'_>>, Box<Diagnostic>>> {
         let model = match &request.model {
             Some(file) => Calibration::read(file)?.model,
             None => Model::estimated(),
@@ -118,7 +118,7 @@ impl Ready {
                 let all: Vec<Recording> = all.collect::<Result<_>>()?;
                 let adapters = all.iter().map(|recording| recording.adapter.clone());
                 let adapters = adapters.collect();
-                let taken = Taken::Recordings(all, std::marker::PhantomData);
+                let taken = Taken::Recordings(all);
                 Ok(Ok(Some(watch(adapters, taken))))
             }
             #[cfg(feature = "gpu")]
@@ -138,7 +138,7 @@ impl Ready {
     }
 
     #[cfg(feature = "gpu")]
-    fn device<'a>(&'a self, measuring: &'a Measuring) -> Result<Device<'a>> {
+    fn device(&self, measuring: &Measuring) -> Result<Device> {
         let adapter = measuring.adapter.clone();
         let program = measuring.program.clone();
         let mut worker = Worker::new(program, adapter.clone(), PATIENCE);
@@ -157,7 +157,7 @@ impl Ready {
                 &self.request.stages,
                 &self.request.modules,
             ),
-            measuring,
+            measuring: measuring.clone(),
             cache,
             recording: Recording::new(&name),
             folder: std::env::temp_dir().join(format!("lodc-{}", std::process::id())),
@@ -211,7 +211,7 @@ impl Watch<'_> {
             Key::of(fixed.into_iter().chain(made))
         };
         let timings: Vec<Vec<Timing>> = match &mut self.taken {
-            Taken::Recordings(recordings, _) => texts
+            Taken::Recordings(recordings) => texts
                 .iter()
                 .map(|text| {
                     let key = key(text.as_ref()?, b"");
@@ -407,7 +407,7 @@ impl Clock for Watch<'_> {
 }
 
 #[cfg(feature = "gpu")]
-impl Device<'_> {
+impl Device {
     /// A text as the device is given it: what was made for it is in files.
     fn variant(&self, text: &Text) -> std::io::Result<Variant> {
         let mut made = Vec::new();

@@ -10,6 +10,7 @@ use crate::eval::refusal;
 use crate::report::{RatioReport, TransitionReport};
 use crate::scene::Scene;
 use crate::search::{Found, SampleSet, Samples, Stand};
+use crate::time::clock::worst;
 use lodc_passes::autolod;
 
 impl Ready {
@@ -21,7 +22,7 @@ impl Ready {
         found: &Found,
         levels: &[EmitLevel],
         output: Output,
-        mut watch: Option<&mut Watch<'_>>,
+        watch: Option<&mut Watch<'_>>,
     ) -> Result<Vec<Option<TransitionReport>>> {
         let mut transitions = vec![None; found.levels.len()];
         if output.transition == Transition::Pop || levels.is_empty() {
@@ -35,6 +36,7 @@ impl Ready {
         let (_, mut scene) = Scene::read_both(&self.source, &emitted, self.scene_file.as_deref())?;
         let base = normal_form(&emitted)?;
         let own = vertex_program(&scene, &base).map_err(|refused| refusal(&refused, &emitted))?;
+        let mut bands = Vec::new();
         for (place, (at, _)) in found.written().enumerate() {
             let Some(until) = emit::band_end(levels, place, output) else {
                 continue;
@@ -67,20 +69,23 @@ impl Ready {
             let moved = [at.checked_sub(1), Some(at)].into_iter().flatten();
             let moved: f64 = moved.map(|of| found.levels[of].used.work.moved).sum();
             let cost = (drawn.used.work.total() + moved) / original.original().used.work.total();
-            let timed = match &mut watch {
-                Some(watch) => watch.whole((&self.base, levels), output, &[(middle, distance)]),
-                None => Vec::new(),
-            };
-            let timed = timed.into_iter().flatten();
+            bands.push((at, (middle, distance)));
             transitions[at] = Some(TransitionReport {
                 kind: output.transition.name(),
                 from: f64::from(from),
                 until: f64::from(until),
                 cost: Some(figure(cost)),
-                time: timed
-                    .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
-                    .map(|timing| RatioReport::of(&timing)),
+                time: None,
             });
+        }
+        if let Some(watch) = watch {
+            let (of, places): (Vec<usize>, Vec<(f64, f64)>) = bands.into_iter().unzip();
+            let timed = watch.whole((&self.base, levels), output, &places);
+            for (at, timings) in of.into_iter().zip(timed) {
+                if let Some(transition) = &mut transitions[at] {
+                    transition.time = worst(&timings).map(RatioReport::of);
+                }
+            }
         }
         Ok(transitions)
     }

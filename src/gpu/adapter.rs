@@ -214,6 +214,29 @@ impl Gpu {
         &self.queue
     }
 
+    /// A texture of so many pixels, in width and height, without MIP levels.
+    pub(super) fn image(
+        &self,
+        [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    }
+
     /// Whether a format can be used so.
     pub(super) fn allows(&self, format: wgpu::TextureFormat, usages: wgpu::TextureUsages) -> bool {
         let features = self.adapter.get_texture_format_features(format);

@@ -381,21 +381,10 @@ impl Pass {
 
     /// The images of a frame, to be drawn to.
     pub(super) fn images(&self, gpu: &Gpu, frame: &Frame) -> Images {
+        let size = [frame.width, frame.height].map(|edge| edge * frame.grid);
         let image = |format: TextureFormat, usage: TextureUsages| {
-            gpu.device().create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width: frame.width * frame.grid,
-                    height: frame.height * frame.grid,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING | usage,
-                view_formats: &[],
-            })
+            let always = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
+            gpu.image(size, format, always | usage)
         };
         let colour = |format: &TextureFormat| match *format {
             COLOUR => image(COLOUR, TextureUsages::COPY_SRC),

@@ -128,27 +128,25 @@ impl Corner {
     }
 }
 
-impl Mesh {
-    fn push(&mut self, corner: &Corner) -> u32 {
-        let at = self.positions.len() as u32;
-        let p = corner.position.as_vec3();
-        self.positions.push(p.to_array());
-        self.normals.push(corner.normal.as_vec3().to_array());
-        self.uvs.push(corner.uv.map(|x| x as f32));
-        // No texture coordinates here are mirrored: the bitangent points to the top of the image.
-        self.tangents
-            .push(corner.tangent.as_vec3().extend(1.0).to_array());
-        // Pale colours that vary over the surface, so that a use of them shows.
-        let [r, g, b] = p.to_array().map(|x| 0.8 + 0.2 * x.clamp(-1.0, 1.0));
-        self.colours.push([r, g, b, 1.0]);
-        at
-    }
+fn push(mesh: &mut Mesh, corner: &Corner) -> u32 {
+    let at = mesh.positions.len() as u32;
+    let p = corner.position.as_vec3();
+    mesh.positions.push(p.to_array());
+    mesh.normals.push(corner.normal.as_vec3().to_array());
+    mesh.uvs.push(corner.uv.map(|x| x as f32));
+    // No texture coordinates here are mirrored: the bitangent points to the top of the image.
+    let tangent = corner.tangent.as_vec3().extend(1.0).to_array();
+    mesh.tangents.push(tangent);
+    // Pale colours that vary over the surface, so that a use of them shows.
+    let [r, g, b] = p.to_array().map(|x| 0.8 + 0.2 * x.clamp(-1.0, 1.0));
+    mesh.colours.push([r, g, b, 1.0]);
+    at
+}
 
-    /// Two triangles of a quad whose corners run along u first: `[top left, top right, bottom left, bottom right]`
-    /// of its part of the image.
-    fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
-        self.indices.extend([a, c, b, b, c, d]);
-    }
+/// Two triangles of a quad whose corners run along u first: `[top left, top right, bottom left, bottom right]`
+/// of its part of the image.
+fn quad(mesh: &mut Mesh, [a, b, c, d]: [u32; 4]) {
+    mesh.indices.extend([a, c, b, b, c, d]);
 }
 
 /// `n` by `n` quads of a surface given over 0..1 from the top left of the image.
@@ -166,14 +164,14 @@ fn add_grid(mesh: &mut Mesh, across: u32, down: u32, surface: impl Fn(f64, f64) 
                 f64::from(i) / f64::from(across),
                 f64::from(j) / f64::from(down),
             );
-            mesh.push(&corner);
+            push(mesh, &corner);
         }
     }
     let row = across + 1;
     for j in 0..down {
         for i in 0..across {
             let a = first + j * row + i;
-            mesh.quad([a, a + 1, a + row, a + row + 1]);
+            quad(mesh, [a, a + 1, a + row, a + row + 1]);
         }
     }
 }
@@ -198,21 +196,21 @@ fn sphere(around: u32, down: u32) -> Mesh {
     // Each triangle at a pole has a pole of its own, in the middle of its u.
     let poles = |mesh: &mut Mesh, v: f64| -> Vec<u32> {
         (0..around)
-            .map(|i| mesh.push(&at((step(i) + step(i + 1)) / 2.0, v)))
+            .map(|i| push(mesh, &at((step(i) + step(i + 1)) / 2.0, v)))
             .collect()
     };
     let north = poles(&mut mesh, 0.0);
     let first = mesh.positions.len() as u32;
     for j in 1..down {
         for i in 0..=around {
-            mesh.push(&at(step(i), f64::from(j) / f64::from(down)));
+            push(&mut mesh, &at(step(i), f64::from(j) / f64::from(down)));
         }
     }
     let row = around + 1;
     for j in 0..down - 2 {
         for i in 0..around {
             let a = first + j * row + i;
-            mesh.quad([a, a + 1, a + row, a + row + 1]);
+            quad(&mut mesh, [a, a + 1, a + row, a + row + 1]);
         }
     }
     let south = poles(&mut mesh, 1.0);

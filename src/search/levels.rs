@@ -285,11 +285,16 @@ impl<'a> Chain<'a> {
         let mut before_here = Vec::new();
         let found = match (found, times) {
             (Some(level), Some(times)) => {
-                let shaders = [&level.shader, &before.shader];
-                let mut timed = times.clock.time(&shaders, search.start().distance());
-                before_here = timed.pop().unwrap_or_default();
-                let timed = timed.pop().unwrap_or_default();
-                Some(Level { timed, ..level })
+                let before = (!before.is_original).then_some(&before.shader);
+                let shaders: Vec<&Shader> = [&level.shader].into_iter().chain(before).collect();
+                let timed = times.clock.time(&shaders, search.start().distance());
+                let mut timed = timed.into_iter();
+                let of_level = timed.next().unwrap_or_default();
+                before_here = timed.next().unwrap_or_default();
+                Some(Level {
+                    timed: of_level,
+                    ..level
+                })
             }
             (found, _) => found,
         };

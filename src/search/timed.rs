@@ -13,7 +13,7 @@ use crate::time::Timing;
 use crate::time::clock::{Clock, is_faster, worst_ratio, worst_regrets};
 use crate::time::model::{Features, Model};
 use lodc_passes::{Fingerprint, Recipe, Shader};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// How many variants beside the frontier are ranked: those that cost least.
 const NEAR: usize = 256;
@@ -102,21 +102,18 @@ impl Bottom<'_, '_> {
     /// What was found, the frontier, and what is near to it, each shader once.
     fn runners(&self) -> Result<Vec<Runner>, Refused> {
         let mut runners: Vec<Runner> = Vec::new();
-        let mut known: BTreeSet<Fingerprint> = BTreeSet::new();
+        let mut known: BTreeMap<Fingerprint, usize> = BTreeMap::new();
         let mut add = |recipe: &Recipe, member, finding| -> Result<(), Refused> {
             let Ok(shader) = recipe.replay(self.checks.base()) else {
                 return Ok(());
             };
             let identity = shader.fingerprint();
-            if !known.insert(identity) {
-                let same = runners
-                    .iter_mut()
-                    .find(|runner| runner.shader.fingerprint() == identity);
-                if let Some(same) = same {
-                    same.member = same.member.or(member);
-                }
+            if let Some(&same) = known.get(&identity) {
+                let same: &mut Runner = &mut runners[same];
+                same.member = same.member.or(member);
                 return Ok(());
             }
+            known.insert(identity, runners.len());
             let start = self.interval.start();
             let (seen, original) = (start.measure(&shader)?, start.original());
             runners.push(Runner {

@@ -23,11 +23,15 @@ pub trait Clock {
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>>;
 }
 
-/// The share of the original's time that a variant takes where it does worst: the largest ratio over the adapters. `None`
-/// where it was not timed.
+/// A variant's timing on the adapter where it does worst: the largest ratio. `None` where it was not timed.
+pub fn worst(timings: &[Timing]) -> Option<&Timing> {
+    let timings = timings.iter();
+    timings.max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// The share of the original's time that a variant takes there.
 pub fn worst_ratio(timings: &[Timing]) -> Option<f64> {
-    let ratios = timings.iter().map(|timing| timing.ratio);
-    ratios.max_by(f64::total_cmp)
+    worst(timings).map(|timing| timing.ratio)
 }
 
 /// Whether one variant is faster than another, beyond the noise, on every adapter.

@@ -220,25 +220,11 @@ struct State {
 }
 
 impl State {
-    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
-        let image = |format| {
-            gpu.device().create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: TextureUsages::STORAGE_BINDING
-                    | TextureUsages::TEXTURE_BINDING
-                    | TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
+    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let usage = TextureUsages::STORAGE_BINDING
+            | TextureUsages::TEXTURE_BINDING
+            | TextureUsages::COPY_SRC;
+        let image = |format| gpu.image(size, format, usage);
         Self {
             composed: image(COLOUR),
             kept: image(COVERED),

@@ -34,22 +34,8 @@ pub(super) struct Views {
 
 impl Canvas {
     pub(super) fn new(gpu: &Gpu, formats: &[Option<TextureFormat>], tiles: Tiles) -> Self {
-        let [width, height] = tiles.size();
         let image = |format: TextureFormat| {
-            let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            });
+            let texture = gpu.image(tiles.size(), format, TextureUsages::RENDER_ATTACHMENT);
             texture.create_view(&Default::default())
         };
         Self {

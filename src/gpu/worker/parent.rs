@@ -124,15 +124,11 @@ impl Worker {
         variant: &Variant,
         wanted: Wanted,
     ) -> Result<Picture, Failure> {
-        let request = Request {
-            adapter: self.adapter.clone(),
-            subject: subject.clone(),
-            task: Task::Draw {
-                variant: variant.clone(),
-                wanted,
-            },
+        let task = Task::Draw {
+            variant: variant.clone(),
+            wanted,
         };
-        let (answer, numbers) = self.ask(&request, self.patience)?;
+        let (answer, numbers) = self.ask(subject, task, self.patience)?;
         match answer {
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
             Answer::Timed(_) | Answer::Name(_) => Err(Failure::Refused(confused())),
@@ -154,12 +150,8 @@ impl Worker {
     /// # Errors
     /// When there is no such adapter, or its driver fails.
     pub fn label(&mut self) -> Result<String, Failure> {
-        let request = Request {
-            adapter: self.adapter.clone(),
-            subject: Subject::default(),
-            task: Task::Name,
-        };
-        match self.ask(&request, self.patience)?.0 {
+        let nothing = Subject::default();
+        match self.ask(&nothing, Task::Name, self.patience)?.0 {
             Answer::Name(name) => Ok(name),
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
             _ => Err(Failure::Refused(confused())),
@@ -215,19 +207,15 @@ impl Worker {
         distance: f64,
         effort: &Effort,
     ) -> Result<Vec<Result<Timing, Failure>>, Failure> {
-        let request = Request {
-            adapter: self.adapter.clone(),
-            subject: subject.clone(),
-            task: Task::Time {
-                variants: variants.to_vec(),
-                distance,
-                effort: *effort,
-            },
+        let task = Task::Time {
+            variants: variants.to_vec(),
+            distance,
+            effort: *effort,
         };
         let count = variants.len() as u32;
         // Each is compiled, as is the original; and rounds may take twice the budget.
         let patience = self.patience * (count + 1) + effort.budget * 3 * count;
-        let (answer, _) = self.ask(&request, patience)?;
+        let (answer, _) = self.ask(subject, task, patience)?;
         match answer {
             Answer::Timed(timings) if timings.len() == variants.len() => {
                 let failed = |said: Said| Failure::Refused(said.error());
@@ -240,9 +228,15 @@ impl Worker {
 
     fn ask(
         &mut self,
-        request: &Request,
+        subject: &Subject,
+        task: Task,
         patience: Duration,
     ) -> Result<(Answer, Vec<f32>), Failure> {
+        let request = Request {
+            adapter: self.adapter.clone(),
+            subject: subject.clone(),
+            task,
+        };
         let mut running = match self.running.take() {
             Some(running) => running,
             None => Running::start(&self.program)?,
@@ -250,7 +244,7 @@ impl Worker {
         let Some(requests) = &mut running.requests else {
             return Err(running.crashed());
         };
-        if write_message(requests, request).is_err() {
+        if write_message(requests, &request).is_err() {
             return Err(running.crashed());
         }
         match running.answers.recv_timeout(patience) {

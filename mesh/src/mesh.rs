@@ -1,4 +1,4 @@
-//! Triangle meshes as the evaluator draws them: in one draw, or in several with bindings of their own.
+//! Triangle meshes as they are drawn: in one draw, or in several with bindings of their own.
 
 use std::ops::Range;
 
@@ -24,8 +24,7 @@ pub struct Mesh {
     pub draws: Vec<Draw>,
 }
 
-/// A part of a mesh that is drawn by itself: its shader sees resources of its own, see
-/// [`Resource::PerDraw`](crate::eval::machine::Resource::PerDraw).
+/// A part of a mesh that is drawn by itself: its shader sees resources of its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Draw {
     /// Its vertices.

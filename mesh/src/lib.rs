@@ -1,0 +1,15 @@
+//! The geometry of lodc, the level-of-detail compiler for shaders: triangle meshes, and what can be said of them without
+//! drawing them.
+//!
+//! ```text
+//! Mesh --surface--> Surface      its points, edges and seams; loses one edge after another, and is a Mesh again
+//! Mesh x Mesh --distance--> how far they are apart
+//! ```
+//!
+//! It knows nothing of shaders, scenes and pictures: how a mesh looks under a shader is `lodc`'s to find out. It is a crate
+//! of its own because it is most of what there is to optimise beside the machine, so that tests neither wait for its
+//! compilation nor run it unoptimised.
+
+mod mesh;
+
+pub use mesh::{Draw, Mesh};
