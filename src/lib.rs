@@ -17,6 +17,8 @@ mod fixtures;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "search")]
+pub mod error;
+#[cfg(feature = "search")]
 pub mod eval;
 #[cfg(feature = "gpu")]
 pub mod gpu;

@@ -7,6 +7,7 @@ use super::search::{Read, Ready, vertex_program};
 use super::{Files, Request, normal_form};
 use crate::emit::control::{self, pipeline_constant};
 use crate::emit::{figure, writable};
+use crate::error::ErrorFigures;
 use crate::eval::image::{encode_png, to_byte};
 use crate::eval::program::{Program, Refused};
 use crate::eval::refusal;
@@ -17,7 +18,7 @@ use crate::report::{ComparedAt, Comparison, Input};
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::search::drawn::{Compiled, Device};
-use crate::search::{ErrorFigures, Measured, OverBlack, SampleSet, Samples, Stand, threshold};
+use crate::search::{Measured, OverBlack, SampleSet, Samples, Stand, threshold};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod;
 use naga::back::pipeline_constants::process_overrides;

@@ -3,7 +3,8 @@
 use super::terminal::columns;
 use super::{CostReport, ErrorReport, Input};
 use crate::Diagnostic;
-use crate::search::{ErrorFigures, Measured};
+use crate::error::ErrorFigures;
+use crate::search::Measured;
 use serde::Serialize;
 
 /// One shader against another, as data.

@@ -13,8 +13,9 @@ pub use comparison::{ComparedAt, Comparison};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::emit::LockedGenerated;
+use crate::error::{ErrorFigures, HeldOut};
 use crate::front::{Place, Source};
-use crate::search::{AtDistance, ErrorFigures, Found, HeldOut, Level, work_of};
+use crate::search::{AtDistance, Found, Level, work_of};
 use crate::time::{Timing, TimingWarning, Verdict};
 use lodc_passes::recipe::pass;
 use lodc_passes::{Class, Goal, Recipe, Shader, Stage};

@@ -2,7 +2,6 @@
 //! seen do not contradict.
 
 use super::descend::Confirmed;
-use super::error::{Details, exceeds};
 use super::guard::Guard;
 use super::kept::Kept;
 use super::levels::{Level, threshold};
@@ -10,6 +9,7 @@ use super::parameters;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Samples, Stand};
 use super::textures;
+use crate::error::{Details, exceeds};
 use crate::eval::program::Refused;
 use crate::scene::Split;
 use lodc_passes::{Recipe, Shader};

@@ -7,13 +7,13 @@
 //! Frames, seeds and offsets are those of [`super::SampleSet`], all pixels of each; what is added up beyond tiles is
 //! added up by the same code.
 
-use super::error::{
-    BACKGROUNDS, Details, ErrorFigures, FrameError, Reference, ReferencePixel, Shown, displayed,
-    encoded, through,
-};
 use super::frame::GRID;
 use super::samples::{OverBlack, offsets};
 use crate::Result;
+use crate::error::{
+    BACKGROUNDS, Details, ErrorFigures, FrameError, Reference, ReferencePixel, Shown, displayed,
+    encoded, through,
+};
 use crate::eval::image::Picture;
 use crate::eval::raster::Frame;
 use crate::gpu::error::{self, ErrorPass, Mean, TileSum};
@@ -206,7 +206,7 @@ fn flip_of(reference: &[Mean], picture: &Picture, scene: &Scene) -> (f64, usize)
 }
 
 // Tiles are the same ones, or the worst of them would be another.
-const _: () = assert!(error::TILE == super::error::TILE);
+const _: () = assert!(error::TILE == crate::error::TILE);
 
 impl FrameError {
     /// From the sums of a frame's tiles over so many drawings.
@@ -224,9 +224,9 @@ impl FrameError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Tally;
     use crate::gpu::AdapterLabel;
     use crate::scene::ToneMapping;
-    use crate::search::error::Tally;
 
     /// Pictures of so many fine pixels a pixel, of any light that a shader can return; alpha is that of a target.
     fn picture(seed: u64, [width, height]: [u32; 2]) -> Picture {

@@ -1,13 +1,11 @@
 //! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it; and a frame as a
 //! picture, for people.
 
-use super::error::{
-    BACKGROUNDS, FrameError, Reference, ReferencePixel, Shown, TILE, Tally, displayed, encoded,
-    held, through,
-};
 use super::programs::Programs;
-use crate::eval::draw::{Layers, Lit, Seen, Shading, each_visible, resolve, seen, shade_into};
-use crate::eval::image::Picture;
+use crate::error::{
+    FrameError, Reference, Shown, TILE, Tally, colours, encoded, held, over_black, reference_of,
+};
+use crate::eval::draw::{Lit, Seen, Shading, seen, shade_into, shade_lit};
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::mix::Mix;
 use crate::eval::program::Program;
@@ -151,7 +149,7 @@ impl Rasterised {
         let output = original.scene.output;
         let mut shading = Shading::default();
         let lit = original.scene.lit(&fine, &reference);
-        shade(
+        shade_lit(
             lit.as_ref(),
             original.fragment,
             &reference,
@@ -260,26 +258,12 @@ impl Rasterised {
     }
 }
 
-/// Shades, and lights what was shaded where something lights it.
-fn shade(
-    lit: Option<&Lit>,
-    program: &Program,
-    coverage: &Coverage,
-    bindings: &Bindings,
-    shading: &mut Shading,
-) {
-    match lit {
-        Some(lit) => lit.shade_into(program, coverage, bindings, shading),
-        None => shade_into(program, coverage, bindings, shading),
-    }
-}
-
 /// A frame as a display shows it over black, row by row: encoded colours, 0..1. One sample a pixel, at its centre.
 pub(super) fn shown(pen: &Pen<'_>, frame: &Frame) -> Vec<[f32; 3]> {
     let coverage = rasterize(pen.vertex, pen.fragment, frame);
     let lit = pen.scene.lit(frame, &coverage);
     let mut shading = Shading::default();
-    shade(
+    shade_lit(
         lit.as_ref(),
         pen.fragment,
         &coverage,
@@ -294,66 +278,6 @@ pub(super) fn shown(pen: &Pen<'_>, frame: &Frame) -> Vec<[f32; 3]> {
             false => [0.0; 3],
         })
         .collect()
-}
-
-/// The pixels that the reference or a fragment covers, and the place of each in the picture, `y * width + x`, sorted.
-fn reference_of<'c>(
-    fine: &Coverage,
-    shading: &Shading,
-    coverages: impl Iterator<Item = &'c Coverage>,
-    output: Output,
-) -> (Reference, Vec<u32>) {
-    let (picture, behind) = over_black(fine, shading, output);
-    let picture = picture.box_filtered(fine.grid);
-    let behind = behind.map(|behind| behind.box_filtered(fine.grid));
-    let mut pixels: Vec<u32> = (0..)
-        .zip(&picture.covered)
-        .filter(|(_, c)| **c > 0.0)
-        .map(|(i, _)| i)
-        .collect();
-    pixels.extend(coverages.flat_map(Coverage::pixels));
-    pixels.sort_unstable();
-    pixels.dedup();
-    let reference = Reference::new(pixels.iter().map(|pixel| {
-        let at = *pixel as usize;
-        let [r, g, b, _] = picture.pixels[at];
-        let covered = picture.covered[at];
-        let through = match &behind {
-            Some(behind) => [0, 1, 2].map(|i| behind.pixels[at][i]),
-            None => [1.0 - covered; 3],
-        };
-        let place = [*pixel % picture.width, *pixel / picture.width];
-        (place, ReferencePixel::new([r, g, b], through), covered)
-    }));
-    (reference, pixels)
-}
-
-/// What a display shows over black, in linear light, and, where fragments are blended, how much more over white.
-fn over_black(fine: &Coverage, shading: &Shading, output: Output) -> (Picture, Option<Picture>) {
-    if !fine.blends() {
-        let mut picture = resolve(fine, shading);
-        for (colour, covered) in picture.pixels.iter_mut().zip(&picture.covered) {
-            if *covered > 0.0 {
-                let [r, g, b] = displayed(output, *colour);
-                *colour = [r, g, b, 1.0];
-            }
-        }
-        return (picture, None);
-    }
-    let mut picture = Picture::empty(fine.width, fine.height);
-    let mut behind = Picture::empty(fine.width, fine.height);
-    let layers = Layers::new(fine, shading, picture.pixels.len(), |_, pixel| pixel);
-    for place in 0..picture.pixels.len() {
-        let colour = layers.compose(place, shading, |colour| held(output, colour));
-        let [r, g, b] = through(output, colour.unwrap_or_default());
-        behind.pixels[place] = [r, g, b, 1.0];
-        if let Some(colour) = colour {
-            let [r, g, b] = displayed(output, colour);
-            picture.pixels[place] = [r, g, b, 1.0];
-            picture.covered[place] = 1.0;
-        }
-    }
-    (picture, Some(behind))
 }
 
 impl Drawing {
@@ -432,7 +356,7 @@ impl Drawing {
         bindings: &Bindings,
         shading: &mut Shading,
     ) {
-        shade(
+        shade_lit(
             self.lit.as_ref(),
             &programs.fragment,
             coverage,
@@ -443,25 +367,8 @@ impl Drawing {
 
     /// What a display shows at each pixel of the reference, over each background.
     fn colours(&self, shading: &Shading, pixels: usize, output: Output) -> Vec<Shown> {
-        let mut colours = vec![BACKGROUNDS; pixels];
         let place = |fragment: usize, _| self.places[fragment];
-        if self.coverage.blends() {
-            let layers = Layers::new(&self.coverage, shading, pixels, place);
-            for (place, shown) in colours.iter_mut().enumerate() {
-                let colour = layers.compose(place, shading, |colour| held(output, colour));
-                if let Some(colour) = colour {
-                    let black = displayed(output, colour);
-                    let more = through(output, colour);
-                    let white = std::array::from_fn(|i| black[i] + more[i]);
-                    *shown = [black, white].map(encoded);
-                }
-            }
-            return colours;
-        }
-        each_visible(&self.coverage, shading, pixels, place, |place, fragment| {
-            colours[place as usize] = [encoded(displayed(output, shading.colours[fragment])); 2];
-        });
-        colours
+        colours(&self.coverage, shading, (pixels, place), output)
     }
 }
 

@@ -5,11 +5,11 @@
 //! all samples have it, and the search goes on from the last variant that they allow. A few such tiles stand for all:
 //! what spoils one highlight spoils the others.
 
-use super::error::Details;
 use super::kept::Kept;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Stand, Tiles};
 use crate::emit::shared_locations;
+use crate::error::Details;
 use crate::eval::program::Refused;
 use lodc_passes::Shader;
 

@@ -7,7 +7,6 @@
 
 use super::confirm::Checks;
 use super::descend::Bottom;
-use super::error::{ErrorFigures, HeldOut};
 use super::exact::{Exact, Scope};
 use super::frontier::{Frontier, Seen};
 use super::greedy::{Prices, Variant};
@@ -17,6 +16,7 @@ use super::kept::Kept;
 use super::parameters;
 use super::samples::{SampleSet, Samples, Stand};
 use super::timed::{Timed, Times};
+use crate::error::{ErrorFigures, HeldOut};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
 use crate::time::clock::{Clock, is_faster, worst_ratio};

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Scene x original --samples--> SampleSet      what errors are measured over, at one distance
-//! SampleSet x Shader --error--> E^2, work      one variant
+//! SampleSet x Shader --error--> E^2, work      one variant (see [`crate::error`])
 //! base x SampleSet --exact--> start            what costs no error, which no later step is credited with
 //! start x SampleSet --greedy, best--> variants --frontier--> non-dominated ones
 //! frontiers x distances --levels--> levels     confirmed on the full set
@@ -16,7 +16,6 @@ mod confirm;
 mod descend;
 #[cfg(feature = "gpu")]
 pub mod drawn;
-pub mod error;
 mod exact;
 mod facts;
 mod frame;
@@ -33,7 +32,6 @@ mod textures;
 mod timed;
 mod trajectory;
 
-pub use error::{Details, ErrorFigures, ErrorSum, HeldOut};
 pub(crate) use exact::work_of;
 pub use exact::{Exact, Scope};
 pub(crate) use facts::{coordinates_per_pixel, texels_per_pixel};

@@ -1,9 +1,9 @@
 //! What errors are measured over: the frames of a scene at one distance, rasterised once, with the pixels of
 //! the reference beside them. A variant is then one run of its fragment program.
 
-use super::error::{Details, ErrorFigures, ErrorSum};
 use super::frame::{Executed, Part, Pen, Rasterised, shown};
 use super::programs::{self, Programs};
+use crate::error::{Details, ErrorFigures, ErrorSum};
 use crate::eval::generated::Baked;
 use crate::eval::program::{Program, Refused};
 use crate::eval::raster::{Frame, Shape, shape};

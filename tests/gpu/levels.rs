@@ -6,12 +6,12 @@ use super::pictures::{
 use super::{INTERFACES, bits, fixtures, read, scratch};
 use lodc::compile::{self, Request};
 use lodc::emit::{Form, write_atomically};
+use lodc::error::{displayed, encoded, through};
 use lodc::eval::image::Picture;
 use lodc::eval::raster::Frame;
 use lodc::front::Source;
 use lodc::gpu::{Gpu, Renderer, Stages};
 use lodc::scene::Scene;
-use lodc::search::error::{displayed, encoded, through};
 use naga::back::{PipelineConstants, pipeline_constants::process_overrides};
 use std::path::{Path, PathBuf};
 

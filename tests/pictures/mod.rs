@@ -4,6 +4,7 @@
     reason = "every test takes what it needs of a shared module"
 )]
 
+use lodc::error::{displayed, encoded, held, through};
 use lodc::eval::draw::{Shading, resolve, shade_into};
 use lodc::eval::image::{Image, Picture};
 use lodc::eval::machine::{Bindings, Resource};
@@ -12,7 +13,6 @@ use lodc::eval::raster::{Frame, rasterize};
 use lodc::eval::texture::{Level, Texture};
 use lodc::gpu::{Gpu, Pipeline, Renderer, Stages};
 use lodc::scene::Scene;
-use lodc::search::error::{displayed, encoded, held, through};
 use naga::Module;
 use std::sync::Arc;
 

@@ -84,6 +84,23 @@ pub fn shade_into(
     shade_targets(fragment, coverage, bindings, &[], None, shading);
 }
 
+/// The same, lit where something lights it: the colours are those that are seen.
+///
+/// # Panics
+/// When a resource of the program is not bound.
+pub(crate) fn shade_lit(
+    lit: Option<&Lit>,
+    fragment: &Program,
+    coverage: &Coverage,
+    bindings: &Bindings,
+    shading: &mut Shading,
+) {
+    match lit {
+        Some(lit) => lit.shade_into(fragment, coverage, bindings, shading),
+        None => shade_into(fragment, coverage, bindings, shading),
+    }
+}
+
 /// The same with what each covered fragment weighs in the program's probes.
 ///
 /// # Panics

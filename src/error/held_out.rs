@@ -75,7 +75,7 @@ fn ratio(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, Option<f64>) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::ErrorSum;
+    use crate::error::ErrorSum;
 
     fn details(frames: &[(f64, f64)]) -> Details {
         let frames: Vec<_> = frames

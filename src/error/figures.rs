@@ -164,7 +164,7 @@ impl ErrorFigures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::error::{BACKGROUNDS, Reference, ReferencePixel, Tally};
+    use crate::error::{BACKGROUNDS, Reference, ReferencePixel, Tally};
 
     /// What a picture of 4 x 4 pixels shows; `None` is background.
     type Colours = [Option<[f32; 3]>; 16];

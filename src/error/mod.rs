@@ -18,6 +18,7 @@ mod figures;
 mod flip;
 mod held_out;
 mod pixel;
+mod shown;
 mod tally;
 
 pub use display::{displayed, encoded, held, through};
@@ -25,5 +26,6 @@ pub use figures::{Details, ErrorFigures};
 pub use held_out::HeldOut;
 pub(crate) use held_out::exceeds;
 pub(crate) use pixel::{BACKGROUNDS, ReferencePixel, Shown};
+pub(crate) use shown::{colours, over_black, reference_of};
 pub use tally::ErrorSum;
 pub(crate) use tally::{FrameError, Reference, TILE, Tally};
