@@ -11,5 +11,9 @@
 //! compilation nor run it unoptimised.
 
 mod mesh;
+#[cfg(test)]
+mod shapes;
+mod surface;
 
 pub use mesh::{Draw, Mesh};
+pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};
