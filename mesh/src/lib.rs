@@ -4,6 +4,7 @@
 //! ```text
 //! Mesh --surface--> Surface      its points, edges and seams; loses one edge after another, and is a Mesh again
 //! Mesh x Mesh --distance--> how far they are apart
+//! [Level] --write--> a GLB of all levels, and a table of their distances
 //! ```
 //!
 //! It knows nothing of shaders, scenes and pictures: how a mesh looks under a shader is `lodc`'s to find out. It is a crate
@@ -14,6 +15,7 @@ mod mesh;
 #[cfg(test)]
 mod shapes;
 mod surface;
+pub mod write;
 
 pub use mesh::{Draw, Mesh};
 pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};
