@@ -55,9 +55,6 @@ impl Surface {
                 None => ends += 1,
             }
         }
-        if ends > 1 {
-            return Kind::Fixed;
-        }
 
         // Once around, from the open end if there is one.
         let start = has_one_before

@@ -328,6 +328,13 @@ fn the_last_of_a_component_stays() {
         ..Mesh::default()
     };
     assert_eq!(Surface::new(&triangle).collapse(0, 1), Err(Refusal::Last));
+    let both_sides = Mesh {
+        indices: vec![0, 1, 2, 2, 1, 0],
+        ..triangle.clone()
+    };
+    let surface = Surface::new(&both_sides);
+    assert_eq!(surface.kind(0), Kind::Inside);
+    assert_eq!(surface.collapse(0, 1), Err(Refusal::Link));
     let tetrahedron = Mesh {
         indices: vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3],
         ..triangle
@@ -362,4 +369,60 @@ fn a_fold_is_refused() {
     assert!(surface.collapse(0, 5).is_ok());
     assert_eq!(surface.collapse(1, 3), Err(Refusal::NotNeighbours));
     assert_eq!(surface.collapse(1, 0), Err(Refusal::Kind));
+}
+
+#[test]
+fn a_point_of_two_fans_stays() {
+    let kind = |indices: &[u32]| {
+        let positions = (0..8u8).map(f32::from).map(|i| [i, i * i, i * i * i]);
+        Surface::new(&Mesh {
+            positions: positions.collect(),
+            indices: indices.to_vec(),
+            ..Mesh::default()
+        })
+        .kind(0)
+    };
+    assert_eq!(kind(&[0, 1, 2, 0, 2, 3, 0, 3, 1]), Kind::Inside);
+    assert_eq!(kind(&[0, 1, 2, 0, 2, 3]), Kind::Border);
+    // Two closed fans, two open ones, one of each.
+    let closed = [0, 1, 2, 0, 2, 3, 0, 3, 1];
+    assert_eq!(
+        kind(&[closed.as_slice(), &[0, 4, 5, 0, 5, 6, 0, 6, 4]].concat()),
+        Kind::Fixed
+    );
+    assert_eq!(kind(&[0, 1, 2, 0, 3, 4]), Kind::Fixed);
+    assert_eq!(kind(&[closed.as_slice(), &[0, 4, 5]].concat()), Kind::Fixed);
+    // Three triangles at an edge: all three from it, all three to it, one against two.
+    assert_eq!(kind(&[0, 1, 2, 0, 1, 3, 0, 1, 4]), Kind::Fixed);
+    assert_eq!(kind(&[0, 2, 1, 0, 3, 1, 0, 4, 1]), Kind::Fixed);
+    assert_eq!(kind(&[0, 1, 2, 0, 3, 1, 0, 4, 1]), Kind::Fixed);
+    for others in [[2, 3], [3, 2]] {
+        let [a, b] = others;
+        assert_eq!(kind(&[0, 1, a, 0, 1, b, 0, 2, 1]), Kind::Fixed);
+        assert_eq!(kind(&[0, 1, 2, 0, 2, a, 0, b, 2]), Kind::Fixed);
+    }
+}
+
+#[test]
+fn a_moved_triangle_keeps_an_area() {
+    // The first triangle has none to begin with, so that only the second one could fold. Moved, they are both on a line.
+    let strip = Mesh {
+        positions: vec![
+            [1.0, 0.0, 0.0],
+            [0.0; 3],
+            [2.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [3.0, 0.0, 0.0],
+        ],
+        indices: vec![0, 1, 2, 0, 2, 3, 2, 4, 3],
+        ..Mesh::default()
+    };
+    let surface = Surface::new(&strip);
+    assert_eq!(surface.kind(3), Kind::Border);
+    assert_eq!(surface.kind(0), Kind::Border);
+    assert_eq!(
+        surface.collapse(0, 3).map(|collapse| collapse.moved.len()),
+        Ok(1)
+    );
+    assert_eq!(surface.collapse(3, 4), Err(Refusal::Sliver));
 }
