@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! Mesh --surface--> Surface      its points, edges and seams; loses one edge after another, and is a Mesh again
+//! Surface --simplify--> Surface  by its geometry alone, under a bound that is proved
 //! Mesh x Mesh --distance--> how far they are apart
 //! [Level] --write--> a GLB of all levels, and a table of their distances
 //! ```
@@ -11,11 +12,15 @@
 //! of its own because it is most of what there is to optimise beside the machine, so that tests neither wait for its
 //! compilation nor run it unoptimised.
 
+pub mod distance;
 mod mesh;
 #[cfg(test)]
 mod shapes;
+pub mod simplify;
 mod surface;
+mod tree;
 pub mod write;
 
 pub use mesh::{Draw, Mesh};
 pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};
+pub use tree::{Nearest, Tree};

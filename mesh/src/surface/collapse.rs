@@ -34,7 +34,7 @@ pub enum Refusal {
     NotNeighbours,
     /// A point of its kind may not leave, or not along this edge.
     Kind,
-    /// There are two vertices that a vertex could become: a seam ends at the point.
+    /// There are two wedges that a wedge could become: a seam ends at the point.
     SeamEnd,
     /// They have neighbours in common that are not opposite to their edge, so that two sheets would be sewn together; or a triangle
     /// would come to lie on another.
@@ -87,8 +87,10 @@ impl Surface {
         })
     }
 
-    /// Each vertex of `from` with the one of `to` that replaces it: on either side of the edge, the one in the same triangle.
+    /// Each vertex of `from` with the one of `to` that replaces it: on either side of the edge, one that is in a triangle
+    /// with its wedge.
     fn replacements(&self, from: u32, to: u32, shared: &[u32]) -> Result<Vec<(u32, u32)>, Refusal> {
+        let wedge_of = |v: u32| self.wedge_of[v as usize];
         let mut pairs: Vec<(u32, u32)> = shared
             .iter()
             .map(|&t| {
@@ -99,7 +101,7 @@ impl Surface {
                         .find(|v| self.point_of(*v) == point)
                         .unwrap_or(corners[0])
                 };
-                (at(from), at(to))
+                (wedge_of(at(from)), at(to))
             })
             .collect();
         let allowed = match self.kind(from) {
@@ -112,11 +114,22 @@ impl Surface {
             return Err(Refusal::Kind);
         }
         pairs.sort_unstable();
-        pairs.dedup();
-        if pairs.windows(2).any(|two| two[0].0 == two[1].0) {
+        if pairs
+            .windows(2)
+            .any(|two| two[0].0 == two[1].0 && wedge_of(two[0].1) != wedge_of(two[1].1))
+        {
             return Err(Refusal::SeamEnd);
         }
-        Ok(pairs)
+        let new = |v: u32| {
+            pairs
+                .iter()
+                .find(|(wedge, _)| *wedge == wedge_of(v))
+                .map(|(_, new)| (v, *new))
+        };
+        self.vertices(from)
+            .iter()
+            .map(|&v| new(v).ok_or(Refusal::Kind))
+            .collect()
     }
 
     /// The link condition: the only neighbours that the two ends have in common are the corners opposite to their edge.
@@ -196,18 +209,18 @@ impl Surface {
         touched.sort_unstable();
         touched.dedup();
         for &point in &touched {
-            let mut wedges = std::mem::take(&mut self.wedges[point as usize]);
-            wedges.clear();
+            let mut vertices = std::mem::take(&mut self.vertices[point as usize]);
+            vertices.clear();
             for &t in &self.stars[point as usize] {
-                wedges.extend(
+                vertices.extend(
                     self.triangles[t as usize]
                         .into_iter()
                         .filter(|v| self.point_of(*v) == point),
                 );
             }
-            wedges.sort_unstable();
-            wedges.dedup();
-            self.wedges[point as usize] = wedges;
+            vertices.sort_unstable();
+            vertices.dedup();
+            self.vertices[point as usize] = vertices;
             self.kinds[point as usize] = self.find_kind(point);
         }
     }

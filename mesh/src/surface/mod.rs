@@ -3,19 +3,19 @@
 //! The only thing that happens to it is the half-edge collapse: a point is moved onto a neighbour. No vertex is ever made
 //! or changed, so that whatever is known of the vertices of the original mesh stays true.
 //!
-//! A *point* is a place: all vertices with equal coordinates. The *vertices* of a point (its wedges) differ in normal,
-//! texture coordinates and so on, or belong to different draws. An edge is a *seam* at an end of which its two triangles have
-//! different vertices. Triangles go by the points when it is asked what is connected, and by the vertices when it is
+//! A *point* is a place: all vertices with equal coordinates. The *vertices* of a point differ in normal,
+//! texture coordinates and so on, or belong to different draws; those that differ in nothing are one *wedge*. An edge is a *seam* at an end
+//! of which its two triangles have different wedges. Triangles go by the points when it is asked what is connected, and by the vertices when it is
 //! asked how it looks.
 
 mod collapse;
-mod kind;
+mod fan;
 
 #[cfg(test)]
 mod tests;
 
 pub use collapse::{Collapse, FLATTEST, LARGEST_TURN, Refusal};
-pub use kind::Kind;
+pub use fan::Kind;
 
 use std::sync::Arc;
 
@@ -31,6 +31,8 @@ const GONE: [u32; 3] = [u32::MAX; 3];
 pub struct Surface {
     /// The point of each vertex of the original mesh.
     point_of: Arc<[u32]>,
+    /// The first vertex of the wedge of each vertex.
+    wedge_of: Arc<[u32]>,
     /// Where each point is.
     positions: Arc<[DVec3]>,
     /// The vertices of each triangle of the original mesh, or [`GONE`].
@@ -40,7 +42,7 @@ pub struct Surface {
     /// The live triangles at each point, sorted.
     stars: Vec<Vec<u32>>,
     /// The vertices of each point that live triangles have, sorted.
-    wedges: Vec<Vec<u32>>,
+    vertices: Vec<Vec<u32>>,
     /// What may happen to each point.
     kinds: Vec<Kind>,
 }
@@ -59,7 +61,7 @@ impl Surface {
         leave_out(mesh, &point_of, &mut triangles);
 
         let mut stars = vec![Vec::new(); positions.len()];
-        let mut wedges = vec![Vec::new(); positions.len()];
+        let mut vertices = vec![Vec::new(); positions.len()];
         let mut live = 0;
         for (t, triangle) in (0u32..).zip(&triangles) {
             if *triangle == GONE {
@@ -69,21 +71,22 @@ impl Surface {
             for &v in triangle {
                 let p = point_of[v as usize] as usize;
                 stars[p].push(t);
-                wedges[p].push(v);
+                vertices[p].push(v);
             }
         }
-        for wedges in &mut wedges {
-            wedges.sort_unstable();
-            wedges.dedup();
+        for vertices in &mut vertices {
+            vertices.sort_unstable();
+            vertices.dedup();
         }
         let mut surface = Surface {
             kinds: vec![Kind::Fixed; positions.len()],
+            wedge_of: wedges(mesh, &point_of).into(),
             point_of: point_of.into(),
             positions: positions.into(),
             triangles,
             live,
             stars,
-            wedges,
+            vertices,
         };
         for point in 0..surface.points() as u32 {
             surface.kinds[point as usize] = surface.find_kind(point);
@@ -108,7 +111,7 @@ impl Surface {
 
     /// The vertices of a point that live triangles have, sorted; none when the point is gone.
     pub fn vertices(&self, point: u32) -> &[u32] {
-        &self.wedges[point as usize]
+        &self.vertices[point as usize]
     }
 
     /// The vertices of a triangle of the original mesh as it is now; `None` when it is gone.
@@ -123,6 +126,11 @@ impl Surface {
             .zip(&self.triangles)
             .filter(|(_, corners)| **corners != GONE)
             .map(|(t, corners)| (t, *corners))
+    }
+
+    /// How many triangles the original has; ids of triangles are below it.
+    pub fn triangle_ids(&self) -> usize {
+        self.triangles.len()
     }
 
     /// How many triangles live.
@@ -210,6 +218,17 @@ impl Surface {
         }
     }
 
+    /// Whether the edge between two vertices of a live triangle has no triangle on its other side with the same two wedges: a border,
+    /// or a seam.
+    pub(crate) fn is_open(&self, triangle: u32, from: u32, to: u32) -> bool {
+        !self.stars[self.point_of(from) as usize]
+            .iter()
+            .any(|&other| {
+                let corners = self.triangles[other as usize];
+                other != triangle && corners.contains(&from) && corners.contains(&to)
+            })
+    }
+
     /// The points of a live triangle.
     pub(crate) fn corners(&self, triangle: u32) -> [u32; 3] {
         self.triangles[triangle as usize].map(|v| self.point_of[v as usize])
@@ -240,6 +259,48 @@ fn points(mesh: &Mesh) -> (Vec<u32>, Vec<DVec3>) {
         };
     }
     (point_of, positions)
+}
+
+/// The first vertex that each vertex is alike with: at the same point, in the same draw, with the same attributes. Tangents may differ but in
+/// their handedness: some exporters give each triangle its own where nothing else differs, and nothing is torn there.
+fn wedges(mesh: &Mesh, point_of: &[u32]) -> Vec<u32> {
+    fn bits<const N: usize>(attribute: &[[f32; N]], v: u32) -> [u32; N] {
+        attribute
+            .get(v as usize)
+            .map_or([0; N], |value| value.map(|c| (c + 0.0).to_bits()))
+    }
+    let mut draw_of = vec![0usize; point_of.len()];
+    for (number, draw) in mesh.draws().into_iter().enumerate() {
+        draw_of[draw.vertices].fill(number);
+    }
+    let place = |v: u32| (point_of[v as usize], draw_of[v as usize]);
+    let looks = |v: u32| {
+        let handedness = mesh
+            .tangents
+            .get(v as usize)
+            .is_some_and(|tangent| tangent[3] < 0.0);
+        (
+            bits(&mesh.normals, v),
+            bits(&mesh.uvs, v),
+            bits(&mesh.second_uvs, v),
+            bits(&mesh.colours, v),
+            handedness,
+        )
+    };
+    let mut order: Vec<u32> = (0..point_of.len() as u32).collect();
+    order.sort_unstable_by(|&a, &b| {
+        place(a)
+            .cmp(&place(b))
+            .then_with(|| looks(a).cmp(&looks(b)))
+            .then(a.cmp(&b))
+    });
+    let mut wedge_of = vec![0; order.len()];
+    for alike in order.chunk_by(|&a, &b| place(a) == place(b) && looks(a) == looks(b)) {
+        for &v in alike {
+            wedge_of[v as usize] = alike[0];
+        }
+    }
+    wedge_of
 }
 
 /// Marks as gone the triangles that have two corners at the same point, and all but the first of those with the same points,

@@ -276,6 +276,9 @@ fn charts_stay_apart_within_a_draw() {
     let mut original = in_draws(&sphere(24, 16), 2, |[x, ..]| usize::from(x > 0.0));
     let first = original.draws[1].vertices.start as u32;
     original.draws.clear();
+    for uv in &mut original.uvs[first as usize..] {
+        uv[0] += 2.0;
+    }
     let surface = collapse_at_random(&original, &mut random);
     for (t, corners) in surface.triangles() {
         let of_first = corners.iter().filter(|v| **v < first).count();
@@ -425,4 +428,34 @@ fn a_moved_triangle_keeps_an_area() {
         Ok(1)
     );
     assert_eq!(surface.collapse(3, 4), Err(Refusal::Sliver));
+}
+
+#[test]
+fn a_mesh_without_shared_vertices_is_no_heap_of_triangles() {
+    // Each triangle has vertices and tangents of its own, as some exporters write it.
+    let mut random = Random(6);
+    let shared = torus(16, 10);
+    let mut original = Mesh::default();
+    for &v in &shared.indices {
+        original.indices.push(original.positions.len() as u32);
+        original.positions.push(shared.positions[v as usize]);
+        original.uvs.push(shared.uvs[v as usize]);
+        original
+            .tangents
+            .push([random.unit() as f32, 0.0, 0.0, 1.0]);
+    }
+    let surface = Surface::new(&original);
+    assert!((0..surface.points() as u32).all(|point| surface.kind(point) == Kind::Inside));
+    assert_eq!(surface.mesh(&original), original);
+    let surface = collapse_at_random(&original, &mut random);
+    assert!(
+        surface.triangle_count() < 16 * 10,
+        "{} are left",
+        surface.triangle_count()
+    );
+
+    // The other side of a mirrored texture is something else.
+    original.tangents[0][3] = -1.0;
+    let surface = Surface::new(&original);
+    assert_eq!(surface.kind(surface.point_of(0)), Kind::Seam);
 }
