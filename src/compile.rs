@@ -16,6 +16,8 @@ mod init;
 #[cfg(feature = "search")]
 mod kept;
 #[cfg(feature = "search")]
+mod model_file;
+#[cfg(feature = "search")]
 mod search;
 mod snapshot;
 mod textures;
@@ -31,6 +33,8 @@ pub use clock::Timings;
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
+#[cfg(feature = "search")]
+pub use model_file::ModelFile;
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect, trajectory};
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};

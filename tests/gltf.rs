@@ -483,6 +483,10 @@ fn damaged_models_are_refused_with_the_reason() {
             ),
             "without mesh compression",
         ),
+        (
+            with("\"POSITION\": 0", "\"POSITION\": 9"),
+            "the positions of mesh 0, primitive 0 are in no accessor",
+        ),
         ("{".to_owned(), "its JSON is broken"),
         ("[]".to_owned(), "its JSON is no object"),
         (String::new(), "its JSON is broken"),
@@ -512,11 +516,72 @@ fn damaged_models_are_refused_with_the_reason() {
     );
     let error = folder.model("helmet.glb").unwrap_err();
     assert!(error.contains("there is no model `helmet.glb`"), "{error}");
-    // A GLB that is cut off anywhere.
+    // A length that is not that of what follows: of the JSON, of the chunk.
     let glb = glb(&whole.replace("\"uri\": \"a.bin\", ", ""), &buffer());
+    let json_end = 20 + u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    for (at, length) in [(12, 4), (12, u32::MAX), (json_end, 4), (json_end, u32::MAX)] {
+        let mut wrong = glb.clone();
+        wrong[at..at + 4].copy_from_slice(&length.to_le_bytes());
+        folder.write("wrong.glb", &wrong);
+        let error = folder.model("wrong.glb").unwrap_err();
+        let reasons = [
+            "is cut off or damaged",
+            "its JSON is broken",
+            "4 bytes instead of",
+        ];
+        assert!(
+            reasons.iter().any(|reason| error.contains(reason)),
+            "{error}"
+        );
+    }
+    // A GLB that is cut off anywhere.
     for end in (0..glb.len()).step_by(97) {
         folder.write("cut.glb", &glb[..end]);
         assert!(folder.model("cut.glb").is_err(), "{end}");
+    }
+}
+
+/// Bytes of a valid GLB changed by chance: no panic, and bounded memory. A failure names the round, and comes again.
+#[test]
+fn damaged_glb_files_are_refused_or_read() {
+    let folder = Folder::new("chance");
+    let whole = glb(&json().replace("\"uri\": \"a.bin\", ", ""), &buffer());
+    for round in 0..1500u64 {
+        let mut state = (round + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut below = |end: usize| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) as usize % end.max(1)
+        };
+        let mut damaged = whole.clone();
+        for _ in 0..=below(4) {
+            let at = below(damaged.len());
+            match below(3) {
+                // Numbers are most of what may go wrong.
+                0 => {
+                    let digits = damaged.iter().enumerate();
+                    let digits: Vec<usize> = digits
+                        .filter(|(_, byte)| byte.is_ascii_digit())
+                        .map(|(at, _)| at)
+                        .collect();
+                    damaged[digits[below(digits.len())]] = b"0123456789"[below(10)];
+                }
+                1 => damaged[at] = b" {}[]\",:-.e9"[below(12)],
+                _ => damaged[at] = below(256) as u8,
+            }
+        }
+        let path = folder.write("a.glb", &damaged);
+        let read = std::panic::catch_unwind(|| lodc::compile::ModelFile::read(&path));
+        match read.unwrap_or_else(|_| panic!("it panics in round {round}")) {
+            Err(error) => assert!(!error.message.is_empty()),
+            Ok(model) => {
+                let mesh = &model.mesh;
+                let count = mesh.positions.len();
+                assert!(count <= damaged.len(), "round {round}: {count}");
+                assert!(mesh.indices.iter().all(|i| (*i as usize) < count));
+            }
+        }
     }
 }
 

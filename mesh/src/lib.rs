@@ -2,6 +2,7 @@
 //! drawing them.
 //!
 //! ```text
+//! bytes --read--> Mesh           of OBJ and PLY files
 //! Mesh --surface--> Surface      its points, edges and seams; loses one edge after another, and is a Mesh again
 //! Surface --simplify--> Surface  by its geometry alone, under a bound that is proved
 //! Mesh x Mesh --distance--> how far they are apart
@@ -14,6 +15,8 @@
 
 pub mod distance;
 mod mesh;
+mod normals;
+pub mod read;
 #[cfg(test)]
 mod shapes;
 pub mod simplify;

@@ -172,7 +172,10 @@ impl Writer<'_> {
                 let names: Vec<&str> = Object::ALL.iter().map(|(name, _)| *name).collect();
                 self.line(
                     &format!("object = {}", quoted(object.name())),
-                    &format!("or a model, .gltf or .glb; {}", names.join(", ")),
+                    &format!(
+                        "or a model, .gltf, .glb, .obj or .ply; {}",
+                        names.join(", ")
+                    ),
                 );
             }
         }

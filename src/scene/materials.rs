@@ -618,11 +618,22 @@ fn read_map(info: &Value, textures: &[Value], samplers: &[Value]) -> Option<Map>
         }
     };
     let said = index(texture, "sampler").and_then(|i| samplers.get(i));
+    Some(Map {
+        image,
+        sampler: said.map_or_else(Sampler::default, read_sampler),
+        place: uv_place(info.as_object()?),
+    })
+}
+
+/// How a texture of a material is read: `info` is what names it.
+pub(super) fn uv_place(info: &serde_json::Map<String, Value>) -> UvPlace {
+    let index = |value: Option<&Value>| u32::try_from(value?.as_u64()?).ok();
     let mut place = UvPlace {
-        set: index(info, "texCoord").map_or(0, |set| set as u32),
+        set: index(info.get("texCoord")).unwrap_or(0),
         ..UvPlace::default()
     };
-    if let Some(transform) = info.pointer("/extensions/KHR_texture_transform") {
+    let extensions = info.get("extensions");
+    if let Some(transform) = extensions.and_then(|all| all.get("KHR_texture_transform")) {
         let pair = |key: &str, other: [f64; 2]| {
             let pair = transform.get(key).and_then(Value::as_array);
             let pair = pair.and_then(|p| Some([p.first()?.as_f64()?, p.get(1)?.as_f64()?]));
@@ -634,13 +645,9 @@ fn read_map(info: &Value, textures: &[Value], samplers: &[Value]) -> Option<Map>
             .get("rotation")
             .and_then(Value::as_f64)
             .unwrap_or(0.0);
-        place.set = index(transform, "texCoord").map_or(place.set, |set| set as u32);
+        place.set = index(transform.get("texCoord")).unwrap_or(place.set);
     }
-    Some(Map {
-        image,
-        sampler: said.map_or_else(Sampler::default, read_sampler),
-        place,
-    })
+    place
 }
 
 /// A glTF sampler; what it leaves out repeats and is filtered.

@@ -12,12 +12,13 @@ mod both;
 mod buffers;
 pub mod camera;
 mod file;
-mod gltf;
+
 mod images;
 pub mod init;
 mod layout;
 mod lighting;
 mod materials;
+mod model;
 pub mod objects;
 mod semantic;
 mod settings;
@@ -27,6 +28,7 @@ mod textures;
 pub use buffers::{Draw, Uniform, Variation};
 pub use images::{Files, ImageAnswer, ImageSource};
 pub use lighting::SceneLighting;
+pub(crate) use model::Model;
 pub use semantic::Semantic;
 pub use settings::{Output, ToneMapping};
 pub use shader::Reading;
@@ -417,7 +419,7 @@ impl Scene {
                 )
             })
         {
-            settings.mesh = gltf::tangents::generate(&settings.mesh, &model.bare);
+            settings.mesh = model::tangents::generate(&settings.mesh, &model.bare);
         }
         let mut scene = Self {
             name: file.map(|_| name.clone()),

@@ -1,9 +1,9 @@
 //! The part of a scene file that does not depend on the shader: object, camera, distances, bound, output.
 
 use super::Host;
+use super::Model;
 use super::camera::{Around, Sphere, spread};
 use super::file::{SceneFile, Toml, suggest};
-use super::gltf::Model;
 use super::mesh::Mesh;
 use super::objects::{Object, bounding_sphere};
 use crate::eval::draw::{Blend, DrawState};
@@ -283,18 +283,7 @@ fn find_object(toml: Toml, name: &Spanned<String>) -> Result<Object> {
         "",
     );
     let error = suggest(error, name.get_ref(), &known);
-    let file = [
-        ".obj", ".ply", ".stl", ".fbx", ".off", ".dae", ".usd", ".usdz", ".blend",
-    ];
-    Err(
-        match file
-            .iter()
-            .any(|end| name.get_ref().to_lowercase().ends_with(end))
-        {
-            true => error.with_note("models are glTF 2.0: export it as .gltf or .glb"),
-            false => error.with_note("a model is named by its file, .gltf or .glb"),
-        },
-    )
+    Err(error.with_note(Model::way_out(name.get_ref())))
 }
 
 fn read_model(toml: Toml, file: &SceneFile) -> Result<DMat4> {

@@ -2,10 +2,11 @@
 //! modes.
 
 use super::Inference;
+use super::Model;
 use super::file::{Entries, Node, Toml, suggest};
-use super::gltf::{MOST_BYTES, Model, add_input};
 use super::images::{ImageAnswer, ImageSource};
 use super::materials::{Factor, Role};
+use super::model::{MOST_BYTES, add_input};
 use crate::eval::generated;
 use crate::eval::image::{Image, Space, decode};
 use crate::eval::machine::Resource;

@@ -10,24 +10,19 @@
 //! is a warning.
 
 mod accessor;
-mod bytes;
 mod primitive;
-pub(super) mod tangents;
 
-use super::materials::Material;
-use super::mesh::{Draw, Mesh};
-use crate::eval::image::{Image, Space, decode};
+use super::bytes::{self, Place};
+use super::{EXPORT, ImageSource, Model, Tables, add_input, refused};
+use crate::scene::hash;
+use crate::scene::materials::Material;
+use crate::scene::mesh::read::MOST_TRIANGLES;
+use crate::scene::mesh::{Draw, Mesh};
 use crate::{Diagnostic, Result};
-pub(super) use bytes::MOST_BYTES;
-use bytes::Place;
 use glam::DMat4;
 use primitive::Part;
 use serde_json::Value;
 use std::collections::BTreeSet;
-use std::path::Path;
-
-/// The most triangles that a model may have. A frame keeps some 600 bytes for each that is in view.
-pub(super) const MOST_TRIANGLES: usize = 2_000_000;
 
 /// The most bytes of JSON, which takes several times as much when it is read.
 const MOST_JSON: usize = 128 << 20;
@@ -42,166 +37,73 @@ const KNOWN_EXTENSIONS: [&str; 6] = [
     "MSFT_texture_dds",
 ];
 
-/// A model as a scene needs it.
-#[derive(Clone, Debug)]
-pub(super) struct Model {
-    /// Its triangles, a draw for each material.
-    pub(super) mesh: Mesh,
-    /// The material of each draw, in their order.
-    pub(super) materials: Vec<Material>,
-    /// The draws whose file has no tangents.
-    pub(super) bare: Vec<usize>,
-    /// Every file that was read, as the scene names it, and the hash of its bytes.
-    pub(super) inputs: Vec<(String, String)>,
-    /// What should be known.
-    pub(super) warnings: Vec<Diagnostic>,
-    images: Vec<ImageSource>,
-}
-
-/// Where an image is.
-#[derive(Clone, Debug)]
-enum ImageSource {
-    File(Place),
-    /// In the bytes of a file of the model, named from the scene.
-    Embedded {
-        file: String,
-        bytes: Vec<u8>,
-    },
-    /// Nowhere that can be read, and why.
-    Lost(String),
-}
-
-/// An image of a model, decoded.
-#[derive(Debug)]
-pub(super) struct Decoded {
-    /// The file that it is in, as the scene names it.
-    pub(super) file: String,
-    /// The hash of that file's bytes, when it was not read before.
-    pub(super) hash: Option<String>,
-    pub(super) image: Image,
-}
-
-impl Model {
-    /// Whether a scene's object is the name of a model's file.
-    pub(super) fn is_named(object: &str) -> bool {
-        let lower = object.to_lowercase();
-        lower.ends_with(".gltf") || lower.ends_with(".glb")
+/// Reads a model of a file that has been read: `inputs` has it already.
+///
+/// # Errors
+/// When the file or one of its buffers is damaged, when the model has no triangles, or too many.
+pub(super) fn read(place: &Place, file: &[u8], mut inputs: Vec<(String, String)>) -> Result<Model> {
+    let name = place.name.as_str();
+    let (json, chunk) = split(name, file)?;
+    let mut json: Value = serde_json::from_slice(json)
+        .map_err(|error| refused(name, format!("its JSON is broken: {error}")).with_note(EXPORT))?;
+    check_extensions(name, &mut json)?;
+    let list = |key: &str| match json.get(key) {
+        Some(Value::Array(all)) => all.clone(),
+        _ => Vec::new(),
+    };
+    let tables = Tables {
+        materials: list("materials"),
+        textures: list("textures"),
+        samplers: list("samplers"),
+    };
+    let images = list("images");
+    give_sources(&mut json);
+    let document = document(name, json)?;
+    let (buffers, files) = read_buffers(&document, place, chunk, &mut inputs)?;
+    let images = images
+        .iter()
+        .map(|image| image_source(image, &document, place, &buffers, &files))
+        .collect();
+    let mut reading = Reading {
+        name,
+        buffers: &buffers,
+        triangles: 0,
+        draws: Vec::new(),
+        skipped: BTreeSet::new(),
+        repaired: 0,
+    };
+    for (node, transform) in nodes(&document, name)? {
+        reading.node(&node, transform, &tables)?;
     }
-
-    /// Reads a model. `name` is the path as the scene says it, relative to `folder`.
-    ///
-    /// # Errors
-    /// When a file cannot be read or is damaged, when the model has no triangles, or too many.
-    pub(super) fn read(name: &str, folder: &Path) -> Result<Self> {
-        let place = Place {
-            name: name.to_owned(),
-            path: folder.join(name),
-        };
-        let file = place.read("model")?;
-        let mut inputs = vec![(name.to_owned(), super::hash(&file))];
-        let (json, chunk) = split(name, &file)?;
-        let mut json: Value = serde_json::from_slice(json).map_err(|error| {
-            refused(name, format!("its JSON is broken: {error}")).with_note(EXPORT)
-        })?;
-        check_extensions(name, &mut json)?;
-        give_sources(&mut json);
-        let list = |key: &str| match json.get(key) {
-            Some(Value::Array(all)) => all.clone(),
-            _ => Vec::new(),
-        };
-        let (materials, textures) = (list("materials"), list("textures"));
-        let (samplers, images) = (list("samplers"), list("images"));
-        let document = document(name, json)?;
-        let (buffers, files) = read_buffers(&document, &place, chunk, &mut inputs)?;
-        let images = images
-            .iter()
-            .map(|image| ImageSource::of(image, &document, &place, &buffers, &files))
-            .collect();
-
-        let material = |index: Option<usize>| {
-            let json = index.and_then(|i| materials.get(i));
-            let name = json.and_then(|m| m.get("name")).and_then(Value::as_str);
-            let name = match (name, index) {
-                (Some(name), _) => name.to_owned(),
-                (None, Some(index)) => format!("material {index}"),
-                (None, None) => "the default material".to_owned(),
-            };
-            Material::read(name, json.unwrap_or(&Value::Null), &textures, &samplers)
-        };
-        let mut reading = Reading {
-            name,
-            buffers: &buffers,
-            triangles: 0,
-            draws: Vec::new(),
-            skipped: BTreeSet::new(),
-            repaired: 0,
-        };
-        for (node, transform) in nodes(&document, name)? {
-            reading.node(&node, transform, &material)?;
-        }
-        let mut warnings: Vec<Diagnostic> = Vec::new();
-        for what in &reading.skipped {
-            warnings.push(*Diagnostic::warning(format!("the model `{name}` {what}")));
-        }
-        if reading.repaired > 0 {
-            warnings.push(*Diagnostic::warning(format!(
+    let mut warnings: Vec<Diagnostic> = Vec::new();
+    for what in &reading.skipped {
+        warnings.push(*Diagnostic::warning(format!("the model `{name}` {what}")));
+    }
+    if reading.repaired > 0 {
+        warnings.push(*Diagnostic::warning(format!(
                 "{} normals of the model `{name}` have no direction, and stand upright on their triangles instead",
                 reading.repaired
             )));
-        }
-        let (mesh, materials, bare) = merge(reading.draws);
-        if mesh.indices.is_empty() {
-            return Err(refused(name, "it has no triangles".to_owned())
-                .with_note("its default scene must have a mesh of triangles"));
-        }
-        for material in &materials {
-            warnings.extend(about(name, material));
-        }
-        Ok(Self {
-            mesh,
-            materials,
-            bare,
-            inputs,
-            warnings,
-            images,
-        })
     }
-
-    /// Reads and decodes one of its images.
-    ///
-    /// # Errors
-    /// When it cannot be read, or is neither PNG nor JPEG.
-    pub(super) fn image(&self, index: usize, space: Space) -> Result<Decoded> {
-        match self.images.get(index) {
-            Some(ImageSource::File(place)) => {
-                let bytes = place.read("image")?;
-                Ok(Decoded {
-                    image: decode(&place.name, &bytes, space)?,
-                    hash: Some(super::hash(&bytes)),
-                    file: place.name.clone(),
-                })
-            }
-            Some(ImageSource::Embedded { file, bytes }) => Ok(Decoded {
-                image: decode(&format!("{file}, image {index}"), bytes, space)?,
-                hash: None,
-                file: file.clone(),
-            }),
-            Some(ImageSource::Lost(why)) => Err(Diagnostic::error(format!(
-                "cannot read image {index} of the model: {why}"
-            ))
-            .with_note(EXPORT)),
-            None => Err(Diagnostic::error(format!(
-                "the model has no image {index}, which one of its textures names"
-            ))
-            .with_note(EXPORT)),
-        }
+    let (mesh, of_draws, bare) = merge(reading.draws);
+    if mesh.indices.is_empty() {
+        return Err(refused(name, "it has no triangles".to_owned())
+            .with_note("its default scene must have a mesh of triangles"));
     }
-}
-
-const EXPORT: &str = "export the model again, as glTF 2.0 or GLB";
-
-fn refused(name: &str, why: String) -> Box<Diagnostic> {
-    Diagnostic::error(format!("cannot read the model `{name}`: {why}"))
+    let (of_draws, materials): (Vec<_>, Vec<Material>) = of_draws.into_iter().unzip();
+    for material in &materials {
+        warnings.extend(about(name, material));
+    }
+    Ok(Model {
+        mesh,
+        materials,
+        bare,
+        inputs,
+        warnings,
+        images,
+        tables,
+        of_draws,
+    })
 }
 
 /// The JSON of a file, and a GLB's chunk of bytes.
@@ -295,9 +197,37 @@ fn give_sources(json: &mut Value) {
     }
 }
 
+/// A primitive whose positions are in no accessor: the `gltf` crate looks for their bounds before it looks whether they
+/// are there, and panics.
+fn lost_positions(json: &Value) -> Option<String> {
+    fn list<'v>(value: &'v Value, key: &str) -> &'v [Value] {
+        value
+            .get(key)
+            .and_then(Value::as_array)
+            .map_or(&[], Vec::as_slice)
+    }
+    let count = list(json, "accessors").len() as u64;
+    for (m, mesh) in list(json, "meshes").iter().enumerate() {
+        for (p, primitive) in list(mesh, "primitives").iter().enumerate() {
+            let index = primitive
+                .pointer("/attributes/POSITION")
+                .and_then(Value::as_u64);
+            if index.is_some_and(|index| index >= count) {
+                return Some(format!(
+                    "the positions of mesh {m}, primitive {p} are in no accessor"
+                ));
+            }
+        }
+    }
+    None
+}
+
 fn document(name: &str, json: Value) -> Result<gltf::Document> {
     let broken =
         |why: String| refused(name, format!("it is no valid glTF 2.0: {why}")).with_note(EXPORT);
+    if let Some(why) = lost_positions(&json) {
+        return Err(broken(why));
+    }
     let root: gltf::json::Root =
         serde_json::from_value(json).map_err(|error| broken(error.to_string()))?;
     gltf::Document::from_json(root).map_err(|error| match error {
@@ -330,9 +260,13 @@ fn read_buffers(
             gltf::buffer::Source::Uri(uri) => match bytes::of_data_uri(uri) {
                 Some(bytes) => (bytes.map_err(lost)?, name.clone()),
                 None => {
-                    let place = place.beside(uri);
+                    let place = place.beside(&bytes::decoded(uri)).map_err(|why| {
+                        refused(name, format!("buffer {i}: {why}")).with_note(
+                            "put the file there, or export the model as GLB, which holds everything",
+                        )
+                    })?;
                     let bytes = place.read("buffer")?;
-                    add_input(inputs, &place.name, super::hash(&bytes));
+                    add_input(inputs, &place.name, hash(&bytes));
                     (bytes, place.name)
                 }
             },
@@ -352,46 +286,6 @@ fn read_buffers(
         files.push(file);
     }
     Ok((buffers, files))
-}
-
-/// Adds a file once.
-pub(super) fn add_input(inputs: &mut Vec<(String, String)>, name: &str, hash: String) {
-    if !inputs.iter().any(|(known, _)| known == name) {
-        inputs.push((name.to_owned(), hash));
-    }
-}
-
-impl ImageSource {
-    fn of(
-        json: &Value,
-        document: &gltf::Document,
-        place: &Place,
-        buffers: &accessor::Buffers,
-        files: &[String],
-    ) -> Self {
-        if let Some(uri) = json.get("uri").and_then(Value::as_str) {
-            return match bytes::of_data_uri(uri) {
-                None => Self::File(place.beside(uri)),
-                Some(Ok(bytes)) => Self::Embedded {
-                    file: place.name.clone(),
-                    bytes,
-                },
-                Some(Err(why)) => Self::Lost(why),
-            };
-        }
-        let view = json.get("bufferView").and_then(Value::as_u64);
-        let view = view.and_then(|index| document.views().nth(usize::try_from(index).ok()?));
-        let found = view.and_then(|view| {
-            let buffer = view.buffer().index();
-            let end = view.offset().checked_add(view.length())?;
-            let bytes = buffers.get(buffer)?.get(view.offset()..end)?;
-            Some((files.get(buffer)?.clone(), bytes.to_vec()))
-        });
-        match found {
-            Some((file, bytes)) => Self::Embedded { file, bytes },
-            None => Self::Lost("its bytes are not there".to_owned()),
-        }
-    }
 }
 
 /// The nodes of the default scene that have a mesh, each with its way to world space, in the order of the file's tree.
@@ -448,12 +342,7 @@ struct Reading<'r> {
 }
 
 impl Reading<'_> {
-    fn node(
-        &mut self,
-        node: &gltf::Node,
-        transform: DMat4,
-        material: &dyn Fn(Option<usize>) -> Material,
-    ) -> Result<()> {
+    fn node(&mut self, node: &gltf::Node, transform: DMat4, tables: &Tables) -> Result<()> {
         let Some(mesh) = node.mesh() else {
             return Ok(());
         };
@@ -480,7 +369,7 @@ impl Reading<'_> {
             let index = primitive.material().index();
             let known = self.draws.iter().position(|(i, ..)| *i == index);
             let known = known.unwrap_or_else(|| {
-                self.draws.push((index, material(index), Vec::new()));
+                self.draws.push((index, tables.material(index), Vec::new()));
                 self.draws.len() - 1
             });
             let Some((_, material, parts)) = self.draws.get_mut(known) else {
@@ -509,14 +398,17 @@ impl Reading<'_> {
     }
 }
 
-/// One mesh of all primitives, those of a material together; the materials; and the draws that lack tangents.
-fn merge(draws: Vec<(Option<usize>, Material, Vec<Part>)>) -> (Mesh, Vec<Material>, Vec<usize>) {
+/// One mesh of all primitives, those of a material together; the material of each draw, with its place in the file;
+/// and the draws that lack tangents.
+fn merge(
+    draws: Vec<(Option<usize>, Material, Vec<Part>)>,
+) -> (Mesh, Vec<(Option<usize>, Material)>, Vec<usize>) {
     let mut mesh = Mesh::default();
     let mut materials = Vec::new();
     let mut bare = Vec::new();
     let all = || draws.iter().flat_map(|(_, _, parts)| parts);
     let second = all().any(|part| !part.second_uvs.is_empty());
-    for (_, material, parts) in &draws {
+    for (index, material, parts) in &draws {
         let vertices = mesh.positions.len();
         let triangles = mesh.indices.len() / 3;
         let whole = parts.iter().all(|part| !part.tangents.is_empty());
@@ -547,7 +439,7 @@ fn merge(draws: Vec<(Option<usize>, Material, Vec<Part>)>) -> (Mesh, Vec<Materia
         if !whole {
             bare.push(materials.len());
         }
-        materials.push(material.clone());
+        materials.push((*index, material.clone()));
         mesh.draws.push(Draw {
             vertices: vertices..mesh.positions.len(),
             triangles: triangles..mesh.indices.len() / 3,
@@ -571,4 +463,36 @@ fn about(name: &str, material: &Material) -> Vec<Diagnostic> {
         )));
     }
     warnings
+}
+
+/// Where an image is.
+fn image_source(
+    json: &Value,
+    document: &gltf::Document,
+    place: &Place,
+    buffers: &accessor::Buffers,
+    files: &[String],
+) -> ImageSource {
+    if let Some(uri) = json.get("uri").and_then(Value::as_str) {
+        return match bytes::of_data_uri(uri) {
+            None => ImageSource::beside(place, &bytes::decoded(uri)),
+            Some(Ok(bytes)) => ImageSource::Embedded {
+                file: place.name.clone(),
+                bytes,
+            },
+            Some(Err(why)) => ImageSource::Lost(why),
+        };
+    }
+    let view = json.get("bufferView").and_then(Value::as_u64);
+    let view = view.and_then(|index| document.views().nth(usize::try_from(index).ok()?));
+    let found = view.and_then(|view| {
+        let buffer = view.buffer().index();
+        let end = view.offset().checked_add(view.length())?;
+        let bytes = buffers.get(buffer)?.get(view.offset()..end)?;
+        Some((files.get(buffer)?.clone(), bytes.to_vec()))
+    });
+    match found {
+        Some((file, bytes)) => ImageSource::Embedded { file, bytes },
+        None => ImageSource::Lost("its bytes are not there".to_owned()),
+    }
 }

@@ -2,13 +2,13 @@
 //!
 //! Nothing is read before its size is known, and nothing larger than [`MOST_BYTES`].
 
+use crate::Diagnostic;
 use crate::front::similar_file;
-use crate::{Diagnostic, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_PAD_INDIFFERENT;
 use std::borrow::Cow;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The most bytes that one file of a model, or an image, may have.
 pub(in crate::scene) const MOST_BYTES: u64 = 1 << 30;
@@ -23,19 +23,36 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A file beside the model, from a URI of it. The scene names it by the same way from its own folder.
-    pub(super) fn beside(&self, uri: &str) -> Self {
-        let uri = decoded(uri);
-        let parent = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
-        let name = parent(Path::new(&self.name)).join(&*uri);
-        Self {
-            name: name.to_string_lossy().into_owned(),
-            path: parent(&self.path).join(&*uri),
+    /// A file in the model's folder, from its path there. The scene names it by the same way from its own folder.
+    ///
+    /// Models come from strangers, and what they name is read, and copied into what is written: so a path that leads
+    /// out of the folder is not followed. A scene may name any file.
+    ///
+    /// # Errors
+    /// What is wrong with such a path.
+    pub(super) fn beside(&self, path: &str) -> Result<Self, String> {
+        let mut depth = 0;
+        for part in Path::new(path).components() {
+            depth += match part {
+                Component::Normal(_) => 1,
+                Component::CurDir => 0,
+                Component::ParentDir => -1,
+                Component::RootDir | Component::Prefix(_) => i32::MIN,
+            };
+            if depth < 0 {
+                return Err(format!("`{path}` leads out of the model's folder"));
+            }
         }
+        let parent = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
+        let name = parent(Path::new(&self.name)).join(path);
+        Ok(Self {
+            name: name.to_string_lossy().into_owned(),
+            path: parent(&self.path).join(path),
+        })
     }
 
     /// Reads the file; `kind` says what it is: `model`, `buffer`, `image`.
-    pub(super) fn read(&self, kind: &str) -> Result<Vec<u8>> {
+    pub(super) fn read(&self, kind: &str) -> crate::Result<Vec<u8>> {
         let name = &self.name;
         let failed = |error: std::io::Error| {
             if error.kind() != std::io::ErrorKind::NotFound {
@@ -79,7 +96,7 @@ impl Place {
 }
 
 /// The bytes of a data URI; nothing when the URI is of another kind.
-pub(super) fn of_data_uri(uri: &str) -> Option<std::result::Result<Vec<u8>, String>> {
+pub(super) fn of_data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
     let (kind, data) = uri.strip_prefix("data:")?.split_once(',')?;
     Some(match kind.ends_with(";base64") {
         true => STANDARD_PAD_INDIFFERENT
@@ -90,7 +107,7 @@ pub(super) fn of_data_uri(uri: &str) -> Option<std::result::Result<Vec<u8>, Stri
 }
 
 /// A path with its `%20` and such as bytes; one that is no text then is left alone.
-fn decoded(uri: &str) -> Cow<'_, str> {
+pub(super) fn decoded(uri: &str) -> Cow<'_, str> {
     if !uri.contains('%') {
         return uri.into();
     }
@@ -122,9 +139,18 @@ mod tests {
             name: "models/helmet.gltf".to_owned(),
             path: "/scenes/models/helmet.gltf".into(),
         };
-        let image = model.beside("maps/base%20colour.png");
+        let beside = |uri: &str| model.beside(&decoded(uri));
+        let image = beside("maps/base%20colour.png").unwrap();
         assert_eq!(image.name, "models/maps/base colour.png");
         assert_eq!(image.path, Path::new("/scenes/models/maps/base colour.png"));
+        assert!(beside("./maps/../a.png").is_ok());
+        for out in ["../a.png", "maps/../../a.png", "/a.png", "%2e%2e/a.png"] {
+            let error = beside(out).unwrap_err();
+            assert!(
+                error.ends_with("leads out of the model's folder"),
+                "{error}"
+            );
+        }
         assert_eq!(decoded("100%.png"), "100%.png");
         assert_eq!(decoded("%ff.png"), "%ff.png");
         let data = |uri: &str| of_data_uri(uri);
