@@ -463,3 +463,110 @@ fn overlap(a: [DVec2; 3], b: [DVec2; 3], touch: f64) -> bool {
     };
     !apart(a, b) && !apart(b, a)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fan about the origin with a ring at these angles, in degrees, and radii, level but for `to`.
+    fn star(ring: &[(f64, f64)], before: &[f64]) -> Star {
+        let place = |&(angle, radius): &(f64, f64)| {
+            DVec3::new(
+                radius * angle.to_radians().cos(),
+                radius * angle.to_radians().sin(),
+                0.0,
+            )
+        };
+        Star {
+            centre: DVec3::ZERO,
+            ring: ring.iter().map(place).collect(),
+            closed: true,
+            far: None,
+            before: before.to_vec(),
+            staying: (10..).take(ring.len() - 2).collect(),
+            behind: None,
+        }
+    }
+
+    #[test]
+    fn moving_carries_what_goes_onto_its_neighbours() {
+        let bounds = |before: &[f64]| {
+            star(
+                &[(0.0, 2.0), (90.0, 1.0), (180.0, 1.0), (270.0, 1.0)],
+                before,
+            )
+            .by_moving()
+        };
+        for (before, after) in [
+            ([5.0, 1.0, 2.0, 7.0], [7.0, 9.0]),
+            ([0.0, 3.0, 4.0, 1.0], [5.0, 6.0]),
+        ] {
+            let found = bounds(&before);
+            assert!(
+                found
+                    .iter()
+                    .zip(after)
+                    .all(|(found, after)| (found - after).abs() < 1e-6),
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn projection_adds_the_difference_of_heights_to_what_is_overlapped() {
+        // A roof over a square: its top goes down to a corner. The ridge of the new fan is the diagonal from `to`, on which m is.
+        let mut roof = star(
+            &[(0.0, 1.0), (90.0, 1.0), (180.0, 1.0), (270.0, 1.0)],
+            &[0.5, 0.25, 0.0, 0.125],
+        );
+        roof.centre.z = 0.1;
+        let bounds = roof.by_projection(DVec3::Z).unwrap();
+        assert!(
+            (bounds[0] - 0.6).abs() < 1e-6 && (bounds[1] - 0.225).abs() < 1e-6,
+            "{bounds:?}"
+        );
+        assert_eq!(roof.by_projection(DVec3::NEG_Z), None);
+        assert_eq!(
+            roof.carry().iter().map(|(t, _)| *t).collect::<Vec<_>>(),
+            [10, 11]
+        );
+        // By moving it would be no less than 1.
+        assert!(roof.carry().iter().all(|(_, bound)| *bound < 0.61));
+    }
+
+    #[test]
+    fn a_fan_that_goes_around_twice_is_not_projected() {
+        let twice: Vec<(f64, f64)> = (0..11)
+            .map(|i| (f64::from(i) * 720.0 / 11.0, if i == 0 { 0.1 } else { 1.0 }))
+            .collect();
+        assert_eq!(star(&twice, &[0.0; 11]).by_projection(DVec3::Z), None);
+        let once: Vec<(f64, f64)> = twice
+            .iter()
+            .map(|(angle, radius)| (angle / 2.0, *radius))
+            .collect();
+        assert!(star(&once, &[0.0; 11]).by_projection(DVec3::Z).is_some());
+    }
+
+    #[test]
+    fn edges_that_are_nearly_one_are_compared_over_all_that_they_share() {
+        let edge = Edge {
+            start: DVec2::new(0.2, 1e-9),
+            end: DVec2::new(0.8, -1e-9),
+            heights: [3.0, 5.0],
+        };
+        // They cross at 0.5, where it is at 4 and the line at 0.
+        let apart = edge.apart_from(DVec2::X, 0.0, TOUCH);
+        assert!((4.0..5.1).contains(&apart), "{apart}");
+        assert_eq!(edge.apart_from(DVec2::NEG_X, 0.0, TOUCH), 0.0);
+        assert_eq!(edge.apart_from(DVec2::Y, 0.0, TOUCH), 0.0);
+        // Across: in the middle of the edge, at the end of the line.
+        let across = Edge {
+            start: DVec2::new(1.0, -1.0),
+            end: DVec2::new(1.0, 1.0),
+            ..edge
+        };
+        assert_eq!(across.apart_from(DVec2::X, 1.0, TOUCH), 3.0);
+        assert_eq!(across.apart_from(DVec2::X * 2.0, 1.0, TOUCH), 3.5);
+        assert_eq!(across.apart_from(DVec2::X * 0.9, 1.0, TOUCH), 0.0);
+    }
+}

@@ -228,7 +228,7 @@ impl<'a> Simplifier<'a> {
                 continue;
             }
             self.make(&collapse, &carried);
-            if self.made.len() % 4096 == 0 {
+            if self.made.len().is_multiple_of(4096) {
                 progress(self.surface.triangle_count());
             }
         }
