@@ -22,6 +22,8 @@ pub mod error;
 pub mod eval;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(feature = "mesh")]
+pub mod mesh;
 #[cfg(feature = "search")]
 pub mod report;
 #[cfg(feature = "search")]

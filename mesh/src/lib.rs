@@ -13,9 +13,11 @@
 //! of its own because it is most of what there is to optimise beside the machine, so that tests neither wait for its
 //! compilation nor run it unoptimised.
 
+mod appearance;
 pub mod distance;
 mod mesh;
 mod normals;
+mod quadric;
 pub mod read;
 #[cfg(test)]
 mod shapes;
@@ -24,6 +26,7 @@ mod surface;
 mod tree;
 pub mod write;
 
+pub use appearance::{CHANNELS, Quadrics, Weights, channels};
 pub use mesh::{Draw, Mesh};
 pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};
-pub use tree::{Nearest, Tree};
+pub use tree::{Nearest, Tree, nearest_in_triangle};

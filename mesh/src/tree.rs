@@ -156,7 +156,7 @@ fn split(
 }
 
 /// The point of a triangle that is nearest to a place.
-fn nearest_in_triangle(to: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+pub fn nearest_in_triangle(to: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
     // Inside, when it is on the inner side of each edge as seen along the normal.
     let normal = (b - a).cross(c - a);
     let square = normal.length_squared();

@@ -165,6 +165,9 @@ pub enum Split {
     Test = 2,
 }
 
+/// What the seeds of pictures for a mesh are made with, beside those of [`Split`].
+const ALL_AROUND: u64 = 3;
+
 /// The most pictures at one distance: what a search can look at, in memory that does not grow with the scene.
 pub const MOST_FRAMES: usize = 256;
 
@@ -524,6 +527,28 @@ impl Scene {
                 frame
             })
             .collect()
+    }
+
+    /// The pictures that a mesh is simplified by, at a distance: of the scene's own views where it lists them, else of `count`
+    /// at least, spread in the same way; of each one sample of the uniforms, in turn, and an offset of its own.
+    pub(crate) fn all_around(&self, distance: f64, count: usize) -> Vec<Frame> {
+        let views = match self.around {
+            Around::Cap(axis, angle) if self.views.len() < count && self.views.len() > 1 => {
+                camera::spread(count, axis, angle)
+            }
+            Around::Cap(..) | Around::Listed => self.views.clone(),
+        };
+        let drawn = self.uniform_samples();
+        let pictures = views.into_iter().enumerate().map(|(i, view)| {
+            let sample = i % drawn * self.samples / drawn;
+            let seed = child(child(self.seed, ALL_AROUND), i as u64);
+            let offset = [0, 1].map(|axis| (unit(child(seed, axis)) - 0.5) as f32);
+            Frame {
+                offset,
+                ..self.frame(view, distance, Draw::Listed(sample))
+            }
+        });
+        pictures.take(MOST_FRAMES).collect()
     }
 
     /// The picture of the same view, of the same values of the uniforms, in this scene.

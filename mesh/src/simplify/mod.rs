@@ -11,7 +11,6 @@
 //! methods, section 2: the static half, here with edges instead of triangles that collapse, and a bound of our own.
 
 mod deviation;
-mod quadric;
 
 #[cfg(test)]
 mod tests;
@@ -19,10 +18,9 @@ mod tests;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use quadric::Quadric;
-
 use crate::Mesh;
 use crate::distance::{self, Reference};
+use crate::quadric::Quadric;
 use crate::surface::{Collapse, Kind, Surface};
 
 pub use deviation::{Carried, Deviation};
@@ -307,7 +305,10 @@ impl<'a> Simplifier<'a> {
                 let mut both = self.quadrics[from as usize];
                 both.add(&self.quadrics[to as usize]);
                 let length = place.distance_squared(there);
-                (both.at(there) + LENGTH_WEIGHT * length * length, to)
+                (
+                    both.at(there).max(0.0) + LENGTH_WEIGHT * length * length,
+                    to,
+                )
             })
             .collect();
         costs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -13,6 +13,7 @@
 mod more;
 mod part;
 mod quads;
+mod retained;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ mod triangle;
 mod vertices;
 
 pub(crate) use quads::Quad;
+pub(crate) use retained::{Retained, Squares};
 pub(crate) use shape::{Shape, shape};
 #[cfg(feature = "gpu")]
 pub(crate) use vertices::attribute;
@@ -148,21 +150,25 @@ pub struct Block {
 /// When a resource of the vertex program is not bound, `grid` is 0, or the frame is larger than [`MAX_EDGE`].
 pub fn rasterize(vertex: &Program, fragment: &Program, frame: &Frame) -> Coverage {
     let vertices = vertices::run(vertex, frame);
-    let late = fragment.discards()
-        || fragment.outputs().iter().any(|slot| {
-            matches!(
-                slot.binding,
-                Binding::BuiltIn(BuiltIn::FragDepth | BuiltIn::SampleMask)
-            )
-        });
     cover(
         vertices,
         vertex.outputs(),
         fragment.inputs(),
         &frame.mesh,
         &Target::of(frame),
-        (late, &frame.states),
+        (is_late(fragment), &frame.states),
     )
+}
+
+/// Whether fragments of a program hide each other only after shading.
+fn is_late(fragment: &Program) -> bool {
+    fragment.discards()
+        || fragment.outputs().iter().any(|slot| {
+            matches!(
+                slot.binding,
+                Binding::BuiltIn(BuiltIn::FragDepth | BuiltIn::SampleMask)
+            )
+        })
 }
 
 /// The fragments of a mesh's triangles whose vertices have been shaded.

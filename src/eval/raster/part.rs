@@ -10,6 +10,20 @@ impl Coverage {
         all.filter(|pixel| *pixel != u32::MAX)
     }
 
+    /// The fine pixel of every covered fragment, in order, with its depth and its triangle: the draw, and the number in that.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = (u32, f32, (usize, u32))> + '_ {
+        self.blocks.iter().flat_map(|block| {
+            block.covered.lanes().filter_map(|lane| {
+                let triangle = block.quads.get(lane / 4)?.triangle;
+                Some((
+                    block.pixels[lane],
+                    block.depths[lane],
+                    (block.draw, triangle),
+                ))
+            })
+        })
+    }
+
     /// The squares of 2 x 2 pixels (not fine pixels) that hold a covered fragment, as (x, y) in units of such
     /// squares, sorted, each once.
     pub fn squares(&self) -> Vec<(u32, u32)> {

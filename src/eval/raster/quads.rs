@@ -2,7 +2,7 @@
 
 use super::triangle::Triangle;
 use super::vertices::Vertices;
-use super::{Block, Target};
+use super::{Block, Squares, Target};
 use crate::eval::lane::{LANES, Mask};
 use crate::eval::program::Slot;
 use naga::{Binding, BuiltIn, Interpolation, ScalarKind};
@@ -22,6 +22,13 @@ pub(crate) struct Quad {
     y: u32,
     /// A bit for each covered fragment: top left, top right, bottom left, bottom right.
     mask: u8,
+}
+
+impl Quad {
+    /// Whether its square is one of these.
+    pub(super) fn is_in(&self, squares: &Squares) -> bool {
+        squares.has(self.x, self.y)
+    }
 }
 
 /// The fragments that are nearest in their pixel, tile by tile. Of equal depths the first triangle wins. Behind them

@@ -66,15 +66,16 @@ impl Triangle {
         for (point, &corner) in points.iter_mut().zip(&corners) {
             *point = to_pixels(*positions.get(corner as usize)?, target)?;
         }
+        // Most triangles of a dense mesh lie between the centres of pixels.
+        let parts = parts(&points, target);
+        if parts.is_empty() {
+            return None;
+        }
         let [p, q, r] = points.map(|[x, y, _, w]| [x, y, w]);
         let normals = [cross(q, r), cross(r, p), cross(p, q)];
         let volume = p[0] * normals[0][0] + p[1] * normals[0][1] + p[2] * normals[0][2];
         let weights = normals.map(|n| n.map(|c| c / volume));
         if !weights.as_flattened().iter().all(|c| c.is_finite()) {
-            return None;
-        }
-        let parts = parts(&points, target);
-        if parts.is_empty() {
             return None;
         }
         let plane = |values: [f64; 3]| {
@@ -198,16 +199,21 @@ fn parts(points: &[Point; 3], target: &Target) -> Vec<Part> {
         |p| p[1] + GUARD * p[3],
         |p| GUARD * p[3] - p[1],
     ];
+    let snap = |p: &Point| [0, 1].map(|i| (p[i] / p[3] * STEPS as f64 + 0.5).floor() as i64);
+    if planes
+        .iter()
+        .all(|plane| points.iter().all(|p| plane(p) >= 0.0))
+    {
+        let part = Part::new([0, 1, 2].map(|i| snap(&points[i])), target);
+        return part.into_iter().collect();
+    }
     let mut polygon = points.to_vec();
     for plane in planes {
         if polygon.iter().any(|p| plane(p) < 0.0) {
             polygon = clip(&polygon, plane);
         }
     }
-    let snapped: Vec<[i64; 2]> = polygon
-        .iter()
-        .map(|p| [0, 1].map(|i| (p[i] / p[3] * STEPS as f64 + 0.5).floor() as i64))
-        .collect();
+    let snapped: Vec<[i64; 2]> = polygon.iter().map(snap).collect();
     let Some((&first, rest)) = snapped.split_first() else {
         return Vec::new();
     };

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// A weighted sum of squared distances from planes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Quadric {
+pub(crate) struct Quadric {
     /// The symmetric matrix: xx, yy, zz, xy, yz, zx.
     square: [f64; 6],
     linear: DVec3,
@@ -15,10 +15,9 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// The squared distance from the plane through a place across a unit normal, times a weight.
-    pub(super) fn plane(place: DVec3, normal: DVec3, weight: f64) -> Quadric {
-        let n = normal;
-        let distance = -n.dot(place);
+    /// The square of a linear function, given by its gradient and its value at the origin, times a weight.
+    pub(crate) fn new(gradient: DVec3, offset: f64, weight: f64) -> Quadric {
+        let n = gradient;
         Quadric {
             square: [
                 n.x * n.x,
@@ -29,13 +28,18 @@ impl Quadric {
                 n.z * n.x,
             ]
             .map(|c| c * weight),
-            linear: n * (distance * weight),
-            constant: distance * distance * weight,
+            linear: n * (offset * weight),
+            constant: offset * offset * weight,
         }
     }
 
+    /// The squared distance from the plane through a place across a unit normal, times a weight.
+    pub(crate) fn plane(place: DVec3, normal: DVec3, weight: f64) -> Quadric {
+        Quadric::new(normal, -normal.dot(place), weight)
+    }
+
     /// Adds another.
-    pub(super) fn add(&mut self, other: &Quadric) {
+    pub(crate) fn add(&mut self, other: &Quadric) {
         for (sum, more) in self.square.iter_mut().zip(other.square) {
             *sum += more;
         }
@@ -43,13 +47,13 @@ impl Quadric {
         self.constant += other.constant;
     }
 
-    /// Its value at a place, no less than 0.
-    pub(super) fn at(&self, p: DVec3) -> f64 {
+    /// Its value at a place; rounding may take it below 0.
+    pub(crate) fn at(&self, p: DVec3) -> f64 {
         let [xx, yy, zz, xy, yz, zx] = self.square;
         let square = xx * p.x * p.x
             + yy * p.y * p.y
             + zz * p.z * p.z
             + 2.0 * (xy * p.x * p.y + yz * p.y * p.z + zx * p.z * p.x);
-        (square + 2.0 * self.linear.dot(p) + self.constant).max(0.0)
+        square + 2.0 * self.linear.dot(p) + self.constant
     }
 }

@@ -1,0 +1,229 @@
+//! How much the pictures react to each triangle: to where it is, and to what its vertices hand over. What no view sees weighs
+//! next to nothing.
+//!
+//! Each is a difference of pictures: the original's, and one of all vertices changed a little, by half a pixel where that has
+//! a meaning. A pixel's squared difference is its triangle's. In sums over the triangles around a point this is what the
+//! derivative of the error is: a dense mesh has less than a pixel for each triangle, so that single ones would say little.
+
+use super::view::Drawn;
+use super::{Pictures, Triangles};
+use crate::eval::raster::{Attribute, Frame, Retained};
+use crate::scene::mesh::Mesh;
+use glam::{DVec3, Vec3};
+use lodc_mesh::{CHANNELS, Surface, Weights};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// How far a picture is moved to see how it reacts, in pixels.
+const STEP: f64 = 0.5;
+
+/// How much a normal or a colour is changed for that.
+const SMALL: f64 = 0.02;
+
+/// What a triangle that no view sees weighs, as a share of the mean by area.
+const UNSEEN: f64 = 1e-4;
+
+/// What is changed, and by how much.
+#[derive(Clone, Copy)]
+enum Change {
+    /// All points outwards.
+    Position(f64),
+    /// A number of all vertices.
+    Channel(usize, f64),
+}
+
+/// What changing each triangle costs, by its number in the mesh: sums of squared errors over the pixels of the views.
+/// `pixels_per_unit` is the scale of the nearest point of the object.
+pub(super) fn weights(
+    pictures: &Pictures<'_>,
+    (surface, triangles): (&Surface, &Triangles),
+    pixels_per_unit: f64,
+) -> Vec<Weights> {
+    let Pictures { subject, views, .. } = pictures;
+    let Some(first) = views.first() else {
+        return Vec::new();
+    };
+    let mesh = &first.frame().mesh;
+    let changes = changes(first.frame(), (surface, triangles), pixels_per_unit);
+    let of_views = views.par_iter().map(|view| {
+        let mut weights = vec![Weights::default(); triangles.0.len()];
+        let squares = view.squares(true);
+        let plain = view.draw(
+            subject,
+            (view.retained(), view.frame()),
+            triangles,
+            &squares,
+        );
+        for change in &changes {
+            let frame = Frame {
+                mesh: Arc::new(changed(mesh, *change)),
+                ..view.frame().clone()
+            };
+            let retained = Retained::new(subject.vertex, subject.fragment, &frame);
+            let other = view.draw(subject, (&retained, &frame), triangles, &squares);
+            let draws = mesh.draws();
+            let of = |(draw, number): (usize, u32)| draws[draw].triangles.start + number as usize;
+            add(&mut weights, *change, [&plain, &other], of);
+        }
+        weights
+    });
+    let sums = of_views
+        .collect::<Vec<_>>()
+        .into_iter()
+        .reduce(|mut sum, view| {
+            for (to, from) in sum.iter_mut().zip(view) {
+                to.position += from.position;
+                for (to, from) in to.channels.iter_mut().zip(from.channels) {
+                    *to += from;
+                }
+            }
+            sum
+        });
+    smooth((surface, triangles), &sums.unwrap_or_default())
+}
+
+/// What the shader is fed with, and the picture may react to.
+fn changes(
+    frame: &Frame,
+    (surface, triangles): (&Surface, &Triangles),
+    pixels_per_unit: f64,
+) -> Vec<Change> {
+    let has = |wanted: &[Attribute]| {
+        let mut fed = frame.attributes.values();
+        fed.any(|attribute| wanted.contains(attribute))
+    };
+    let mut changes = Vec::new();
+    if pixels_per_unit > 0.0 {
+        changes.push(Change::Position(STEP / pixels_per_unit));
+    }
+    if has(&[Attribute::Normal, Attribute::Bitangent]) {
+        changes.extend([0, 1, 2].map(|channel| Change::Channel(channel, SMALL)));
+    }
+    if has(&[Attribute::Uv, Attribute::SecondUv]) {
+        // As far as half a pixel is, on average over the surface.
+        let (mut area, mut area_of_texture) = (0.0, 0.0);
+        for corners in triangles.0.iter().flatten() {
+            let [a, b, c] = corners.map(|v| surface.position(surface.point_of(v)));
+            area += (b - a).cross(c - a).length();
+            let [a, b, c] = corners.map(|v| lodc_mesh::channels(&frame.mesh, v));
+            let [p, q] = [b, c].map(|to| [to[3] - a[3], to[4] - a[4]]);
+            area_of_texture += (p[0] * q[1] - p[1] * q[0]).abs();
+        }
+        let step = STEP / pixels_per_unit * (area_of_texture / area).sqrt();
+        if step.is_finite() && step > 0.0 {
+            changes.extend([3, 4].map(|channel| Change::Channel(channel, step)));
+        }
+    }
+    if has(&[Attribute::Colour]) {
+        changes.extend([5, 6, 7].map(|channel| Change::Channel(channel, SMALL)));
+    }
+    changes
+}
+
+/// A mesh of which all vertices are changed.
+fn changed(mesh: &Mesh, change: Change) -> Mesh {
+    let mut mesh = mesh.clone();
+    match change {
+        Change::Position(step) => {
+            for (position, normal) in mesh.positions.iter_mut().zip(&mesh.normals) {
+                let outwards = Vec3::from(*normal).normalize_or_zero() * step as f32;
+                *position = (Vec3::from(*position) + outwards).to_array();
+            }
+        }
+        Change::Channel(channel @ 0..3, step) => {
+            for normal in &mut mesh.normals {
+                normal[channel] += step as f32;
+                *normal = Vec3::from(*normal).normalize_or_zero().to_array();
+            }
+        }
+        Change::Channel(channel @ 3..5, step) => {
+            let both = mesh.uvs.iter_mut().chain(&mut mesh.second_uvs);
+            both.for_each(|uv| uv[channel - 3] += step as f32);
+        }
+        Change::Channel(channel, step) => {
+            let colours = mesh.colours.iter_mut();
+            colours.for_each(|colour| colour[channel - 5] += step as f32);
+        }
+    }
+    mesh
+}
+
+/// Adds what two pictures differ by to the triangles that are seen in them; `of` numbers those.
+fn add(
+    weights: &mut [Weights],
+    change: Change,
+    [plain, other]: [&Drawn; 2],
+    of: impl Fn((usize, u32)) -> usize,
+) {
+    let mut seen = vec![None; plain.shown.len()];
+    for drawn in [other, plain] {
+        for (pixel, _, triangle) in drawn.coverage.triangles() {
+            seen[pixel as usize] = Some(of(triangle));
+        }
+    }
+    for ((triangle, plain), other) in seen.iter().zip(&plain.shown).zip(&other.shown) {
+        let Some(weights) = triangle.and_then(|triangle| weights.get_mut(triangle)) else {
+            continue;
+        };
+        let each = plain.as_flattened().iter().zip(other.as_flattened());
+        let square = each
+            .map(|(a, b)| f64::from(a - b).powi(2))
+            .filter(|square| square.is_finite())
+            .sum::<f64>()
+            / 6.0;
+        match change {
+            Change::Position(step) => weights.position += square / (step * step),
+            Change::Channel(channel, step) => weights.channels[channel] += square / (step * step),
+        }
+    }
+}
+
+/// Spreads weights over the triangles around each point, by area.
+fn smooth((surface, triangles): (&Surface, &Triangles), weights: &[Weights]) -> Vec<Weights> {
+    let area = |corners: [u32; 3]| {
+        let [a, b, c] = corners.map(|vertex| surface.position(surface.point_of(vertex)));
+        DVec3::cross(b - a, c - a).length()
+    };
+    let parts = |weights: &Weights| {
+        let mut parts = [weights.position; CHANNELS + 1];
+        parts[1..].copy_from_slice(&weights.channels);
+        parts
+    };
+    let mut areas = vec![0.0; surface.points()];
+    let mut sums = vec![[0.0; CHANNELS + 1]; surface.points()];
+    let (mut whole, mut total) = (0.0, [0.0; CHANNELS + 1]);
+    for (corners, weights) in triangles.0.iter().zip(weights) {
+        let Some(corners) = *corners else { continue };
+        let (area, parts) = (area(corners), parts(weights));
+        for point in corners.map(|vertex| surface.point_of(vertex) as usize) {
+            areas[point] += area;
+            for (to, from) in sums[point].iter_mut().zip(parts) {
+                *to += from;
+            }
+        }
+        whole += area;
+        for (to, from) in total.iter_mut().zip(parts) {
+            *to += from;
+        }
+    }
+    let least = total.map(|total| UNSEEN * total / f64::max(whole, f64::MIN_POSITIVE));
+    let of_triangle = |corners: &Option<[u32; 3]>| {
+        let Some(corners) = *corners else {
+            return Weights::default();
+        };
+        let area = area(corners);
+        let points = corners.map(|vertex| surface.point_of(vertex) as usize);
+        let part = |i: usize| {
+            let density = points.map(|point| match areas[point] > 0.0 {
+                true => sums[point][i] / areas[point],
+                false => 0.0,
+            });
+            area * (density.iter().sum::<f64>() / 3.0 + least[i])
+        };
+        Weights {
+            position: part(0),
+            channels: std::array::from_fn(|channel| part(channel + 1)),
+        }
+    };
+    triangles.0.iter().map(of_triangle).collect()
+}
