@@ -2,6 +2,9 @@
 //! Khronos' validator (`tests/gltf`, which `.ci/run` installs) on what was written.
 #![cfg(feature = "cli")]
 
+#[path = "../examples/models/shapes.rs"]
+mod shapes;
+
 use lodc::compile::ModelFile;
 use lodc::front::Source;
 use lodc::scene::Scene;
@@ -311,5 +314,45 @@ fn the_validator_finds_what_is_broken() {
     fs::write(&file, bytes).unwrap();
     if let Some(lines) = judged(&[&file]) {
         assert!(lines[0].contains("ACCESSOR_INDEX_OOB"), "{lines:?}");
+    }
+}
+
+#[test]
+fn generated_models_are_whole() {
+    let folder = Folder::new("shapes");
+    for (name, borders) in [("rock", 0), ("knot", 0), ("vase", 2)] {
+        let mesh = shapes::shape(name, 5_000).unwrap();
+        let count = mesh.indices.len() / 3;
+        assert!(count.abs_diff(5_000) < 500, "{name}: {count}");
+        assert_eq!(shapes::shape(name, 5_000).unwrap(), mesh, "{name}");
+        // Each edge, by the places of its ends, has a triangle on both sides; a border is a ring of edges with one.
+        let place = |v: u32| mesh.positions[v as usize].map(|x| (x + 0.0).to_bits());
+        let mut edges = std::collections::BTreeMap::new();
+        for triangle in mesh.indices.chunks_exact(3) {
+            let corner = |i: usize| glam::Vec3::from(mesh.positions[triangle[i] as usize]);
+            let face = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+            for i in 0..3 {
+                let normal = mesh.normals[triangle[i] as usize];
+                assert!(face.normalize().dot(normal.into()) > 0.3, "{name}");
+                let ends = [place(triangle[i]), place(triangle[(i + 1) % 3])];
+                let known = edges.entry([ends[0].min(ends[1]), ends[0].max(ends[1])]);
+                *known.or_insert(0) += 1;
+            }
+        }
+        let open = edges.values().filter(|sides| **sides == 1).count();
+        assert!(edges.values().all(|sides| *sides <= 2), "{name}");
+        assert_eq!(open, borders * 50, "{name}");
+        let path = folder.0.join(format!("{name}.obj"));
+        fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let model = ModelFile::read(&path).unwrap();
+        let level = Level {
+            mesh: &mesh,
+            distance: 1.0,
+        };
+        let file = folder
+            .levels(&model, &[level], &format!("{name}.glb"), false)
+            .swap_remove(0);
+        assert_same(&ModelFile::read(&file).unwrap().mesh, &mesh, name);
+        judge(&[&file]);
     }
 }
