@@ -6,6 +6,7 @@
 //!   --reaction--> weights of triangles          how much the picture reacts to each
 //! Surface x weights --image_driven--> Sequence  every mesh on the way down, with its error
 //! Sequence --selection--> meshes that are worth keeping
+//! distances x bounds --levels--> a mesh for each, confirmed by pictures that had no part in it
 //! ```
 //!
 //! The geometry is [`lodc_mesh`]'s. It does not know the search.
@@ -15,12 +16,14 @@
 #[cfg(feature = "meshopt")]
 pub mod baseline;
 mod image_driven;
+mod levels;
 mod pictures;
 mod reaction;
 mod selection;
 mod view;
 
 pub use image_driven::{EdgeRule, Settings, Simplifier, Until, Watch};
+pub use levels::{Maker, MeshLevel, Other, Wanted, levels};
 pub use pictures::{Pictures, Triangles};
 pub use selection::{Sequence, Step};
 

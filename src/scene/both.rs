@@ -5,7 +5,7 @@
 
 use super::buffers::{self, Buffer, Draw};
 use super::file::{Entries, SceneFile};
-use super::{Files, Scene, attributes, lighting};
+use super::{Files, Instead, Scene, attributes, lighting};
 use crate::front::{Source, read_text};
 use crate::{Diagnostic, Result};
 use naga::{Module, TypeInner};
@@ -24,8 +24,12 @@ impl Scene {
     ) -> Result<(Self, Self)> {
         let text = path.map(|path| read_text(path, "scene")).transpose()?;
         let file = path.zip(text.as_deref());
-        let mut a = Self::resolve_beside(original, file, Some(other), &Files)?;
-        let mut b = Self::resolve_beside(other, file, Some(original), &Files)?;
+        let beside = |other| Instead {
+            other: Some(other),
+            ..Instead::default()
+        };
+        let mut a = Self::resolve_instead(original, file, beside(other), &Files)?;
+        let mut b = Self::resolve_instead(other, file, beside(original), &Files)?;
         if a.object != b.object {
             return Err(Diagnostic::error(format!(
                 "`{}` and `{}` are drawn on different objects: one reads a mesh, the other only the vertices' indices",

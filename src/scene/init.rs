@@ -5,7 +5,7 @@
 
 use super::attributes::unfed;
 use super::objects::Object;
-use super::{Files, Missing, Output, Scene, textures};
+use super::{Files, Instead, Missing, Output, Scene, textures};
 use crate::eval::draw::Blend;
 use crate::front::Source;
 use crate::{Diagnostic, Result};
@@ -48,7 +48,7 @@ pub fn initial(
         let _ = writeln!(fed, "{line}");
     }
     let attempt = |text: &str| {
-        Scene::attempt(source, Some((path, text)), None, &Files)
+        Scene::attempt(source, Some((path, text)), Instead::default(), &Files)
             .map_err(|error| unplaced(error, path))
     };
     // What is missing gets some value for a while: the rest is known then.

@@ -219,6 +219,15 @@ struct Missing {
     span: Span,
 }
 
+/// What a scene is resolved with beside its file.
+#[derive(Clone, Copy, Default)]
+struct Instead<'a> {
+    /// A shader of which the file may speak too: what it says of that alone is passed over.
+    other: Option<&'a Source>,
+    /// The object.
+    object: Option<&'a str>,
+}
+
 impl Scene {
     /// Bytes of the textures at these groups and bindings, with their MIP levels, at 4 bytes a texel.
     pub fn texture_bytes(&self, bindings: &BTreeSet<(u32, u32)>) -> u64 {
@@ -248,14 +257,36 @@ impl Scene {
         path: Option<&Path>,
         images: &dyn ImageSource,
     ) -> Result<Self> {
-        let beside = || Some(source.path.as_ref()?.with_extension("toml")).filter(|p| p.exists());
-        match path.map(PathBuf::from).or_else(beside) {
+        match Self::path(source, path) {
             Some(path) => {
                 let text = read_text(&path, "scene")?;
                 Self::resolve_with(source, Some((&path, &text)), images)
             }
             None => Self::resolve_with(source, None, images),
         }
+    }
+
+    /// As [`Scene::read`], with another object in place of the one that the file names: as the file would name it, in its
+    /// folder. What it says of distances stays.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], and when the object cannot be read.
+    pub fn read_on(source: &Source, path: Option<&Path>, object: &str) -> Result<Self> {
+        let path = Self::path(source, path);
+        let text = path.as_ref().map(|path| read_text(path, "scene"));
+        let text = text.transpose()?;
+        let instead = Instead {
+            object: Some(object),
+            ..Instead::default()
+        };
+        let file = path.as_deref().zip(text.as_deref());
+        Self::resolve_instead(source, file, instead, &Files)
+    }
+
+    /// The scene file that is meant: the one at `path`, or else the one beside the shader, if there is one.
+    pub(crate) fn path(source: &Source, path: Option<&Path>) -> Option<PathBuf> {
+        let beside = || Some(source.path.as_ref()?.with_extension("toml")).filter(|p| p.exists());
+        path.map(PathBuf::from).or_else(beside)
     }
 
     /// Fills a scene in against a shader. `file` is the scene file's path, which paths in it are relative to,
@@ -277,17 +308,17 @@ impl Scene {
         file: Option<(&Path, &str)>,
         images: &dyn ImageSource,
     ) -> Result<Self> {
-        Self::resolve_beside(source, file, None, images)
+        Self::resolve_instead(source, file, Instead::default(), images)
     }
 
-    /// As [`Scene::resolve`]; what the file says of `other` alone is passed over.
-    fn resolve_beside(
+    /// As [`Scene::resolve`], with something instead of what the file says.
+    fn resolve_instead(
         source: &Source,
         file: Option<(&Path, &str)>,
-        other: Option<&Source>,
+        instead: Instead<'_>,
         images: &dyn ImageSource,
     ) -> Result<Self> {
-        Self::attempt(source, file, other, images)?.map_err(|missing| {
+        Self::attempt(source, file, instead, images)?.map_err(|missing| {
             let name = Self::file_name(source, file);
             let place = match file {
                 Some(_) => format!("`{name}`"),
@@ -312,15 +343,18 @@ impl Scene {
     fn attempt(
         source: &Source,
         file: Option<(&Path, &str)>,
-        other: Option<&Source>,
+        instead: Instead<'_>,
         images: &dyn ImageSource,
     ) -> Result<std::result::Result<Self, Vec<Missing>>> {
         let name = Self::file_name(source, file);
         let text = file.map_or("", |(_, text)| text);
         let toml = Toml { name: &name, text };
         let mut file_values = toml.parse()?;
-        if let Some(other) = other {
+        if let Some(other) = instead.other {
             both::pass_over(&mut file_values, source, other);
+        }
+        if let Some(object) = instead.object {
+            file_values.object = Some(toml::Spanned::new(0..0, object.to_owned()));
         }
         let folder = match file {
             Some((path, _)) => path.parent(),
