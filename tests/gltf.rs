@@ -614,6 +614,51 @@ fn images_of_models_are_bounded_and_named() {
     assert!(error.contains("60000 x 60000"), "{error}");
 }
 
+#[test]
+fn what_many_entries_share_takes_its_memory_once() {
+    let folder = Folder::new("shared");
+    // A mebibyte that 4,000 images are in: 4 GiB, if each had its own.
+    let entry = "{ \"bufferView\": 0, \"mimeType\": \"image/png\" }";
+    let images = vec![entry; 4_000].join(",");
+    let triangle = bytes_of(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let mut chunk = encode_png(1, 1, &[[255; 4]]).unwrap();
+    chunk.resize(1 << 20, 0);
+    chunk.extend(triangle);
+    let json = |images: &str, nodes: &str, accessor: &str| {
+        format!(
+            r#"{{ "asset": {{ "version": "2.0" }}, "images": [{images}],
+            "buffers": [{{ "byteLength": {length} }}],
+            "bufferViews": [{{ "buffer": 0, "byteLength": 1048576 }}, {{ "buffer": 0, "byteOffset": 1048576, "byteLength": 36 }}],
+            "accessors": [{{ {accessor}, "componentType": 5126, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }}],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }} }}] }}],
+            "nodes": [{nodes}] }}"#,
+            length = (1 << 20) + 36,
+        )
+    };
+    let place = "\"bufferView\": 1, \"count\": 3";
+    let whole = json(&images, "{ \"mesh\": 0 }", place);
+    let path = folder.write("a.glb", glb(&whole, &chunk));
+    let model = lodc::compile::ModelFile::read(&path).unwrap();
+    let error = model.looks().unwrap_err().to_string();
+    assert!(error.contains("more than 1024 MiB together"), "{error}");
+    // A thousand nodes with millions of vertices each, of three numbers in the file, and no triangle.
+    let nodes = vec!["{ \"mesh\": 0 }"; 1_000].join(",");
+    let sparse = "\"count\": 3500000, \"sparse\": { \"count\": 1, \"values\": { \"bufferView\": 1 }, \
+                  \"indices\": { \"bufferView\": 1, \"componentType\": 5125 } }";
+    let points = json(entry, &nodes, sparse)
+        .replace(
+            "\"POSITION\": 0 }",
+            "\"POSITION\": 0, \"NORMAL\": 0 }, \"indices\": 1",
+        )
+        .replace(
+            "\"max\": [1, 1, 0] }]",
+            "\"max\": [1, 1, 0] }, { \"bufferView\": 1, \"count\": 1, \"componentType\": 5125, \"type\": \"SCALAR\" }]",
+        );
+    folder.write("b.glb", glb(&points, &chunk));
+    let error = folder.model("b.glb").unwrap_err();
+    assert!(error.contains("more than 6000000 vertices"), "{error}");
+}
+
 /// The checksum of a PNG chunk.
 fn crc32(bytes: &[u8]) -> u32 {
     let step = |mut c: u32| {

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let looks = Looks {
         of_draws: vec![Some(0)],
         materials: vec![format!(
-            "{{\"name\":\"{shape}\",\"pbrMetallicRoughness\":{{\"metallicFactor\":0,\"roughnessFactor\":0.7}}}}"
+            "{{\"name\":\"{shape}\",\"pbrMetallicRoughness\":{{\"baseColorFactor\":[0.4,0.35,0.3,1],\"metallicFactor\":0,\"roughnessFactor\":0.7}}}}"
         )],
         ..Looks::default()
     };

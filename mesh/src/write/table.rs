@@ -32,14 +32,14 @@ pub fn table(levels: &[Level], sight: &Sight, file: &str, files: &[String]) -> S
         let begin = if i == 0 { 0.0 } else { level.distance };
         let end = levels.get(i + 1).map(|next| next.distance);
         let fade = |from: Option<f64>| match from {
-            Some(from) => format!("[{from:?}, {:?}]", from * FADE),
+            Some(from) => format!("[{from:?}, {:?}]", short(from * FADE)),
             None => "[inf, inf]".to_owned(),
         };
         let start = match i {
             0 => "[0.0, 0.0]".to_owned(),
             _ => fade(Some(begin)),
         };
-        let at_end = |size: &dyn Fn(f64) -> f64| end.map_or(0.0, size);
+        let at_end = |size: &dyn Fn(f64) -> f64| end.map_or(0.0, |end| short(size(end)));
         let _ = write!(
             text,
             "\n[[level]]\n{}triangles = {}\nvertices = {}\ndistance = {begin:?}\n\
@@ -64,6 +64,11 @@ pub fn table(levels: &[Level], sight: &Sight, file: &str, files: &[String]) -> S
         );
     }
     text
+}
+
+/// As many digits as anybody needs.
+fn short(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
 }
 
 /// A text as TOML has it.
@@ -114,13 +119,13 @@ mod tests {
         };
         assert_eq!(lines("distance = "), ["0.0", "8.0", "20.0"]);
         let bevy = lines("bevy = ");
-        assert!(bevy[0].starts_with("{ start_margin = [0.0, 0.0], end_margin = [8.0, 8.8"));
+        assert!(bevy[0].starts_with("{ start_margin = [0.0, 0.0], end_margin = [8.0, 8.8]"));
         assert!(
-            bevy[1].starts_with("{ start_margin = [8.0, 8.8"),
+            bevy[1].starts_with("{ start_margin = [8.0, 8.8]"),
             "{}",
             bevy[1]
         );
-        assert!(bevy[1].contains("end_margin = [20.0, 22.0"));
+        assert!(bevy[1].contains("end_margin = [20.0, 22.0]"));
         assert!(bevy[2].contains("end_margin = [inf, inf]"));
         let godot = lines("godot = ");
         assert_eq!(
@@ -138,6 +143,6 @@ mod tests {
             "{unity:?}"
         );
         let coverage: f64 = lines("screen_coverage = ")[0].parse().unwrap();
-        assert!((coverage - 5.0 * std::f64::consts::PI / 256.0).abs() < 1e-12);
+        assert!((coverage - 5.0 * std::f64::consts::PI / 256.0).abs() < 1e-6);
     }
 }

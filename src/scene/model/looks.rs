@@ -4,7 +4,7 @@
 //! material, and its first set is the one that this texture is read with. So textures that are read the same way need
 //! no transform any more, and those of others are changed by what is left.
 
-use super::{EXPORT, ImageSource, Model};
+use super::{EXPORT, ImageSource, MOST_BYTES, Model};
 use crate::scene::materials::{UvPlace, uv_place};
 use crate::{Diagnostic, Result};
 use lodc_mesh::write::{Looks, Picture};
@@ -33,15 +33,26 @@ impl Model {
             }
             values.iter().map(Value::to_string).collect()
         };
-        let images = self.images.iter().enumerate();
+        let mut total = 0;
+        let mut images = Vec::new();
+        for (index, image) in self.images.iter().enumerate() {
+            let picture = picture(index, image)?;
+            total += picture.bytes.len() as u64;
+            if total > MOST_BYTES {
+                return Err(Diagnostic::error(format!(
+                    "the images of the model have more than {} MiB together",
+                    MOST_BYTES >> 20
+                ))
+                .with_note("export it with smaller ones"));
+            }
+            images.push(picture);
+        }
         Ok(Looks {
             of_draws: self.of_draws.clone(),
             materials: texts(&materials),
             textures: texts(&self.tables.textures),
             samplers: texts(&self.tables.samplers),
-            images: images
-                .map(|(index, image)| picture(index, image))
-                .collect::<Result<_>>()?,
+            images,
             extensions: extensions.into_iter().collect(),
         })
     }
@@ -54,7 +65,10 @@ fn picture(index: usize, image: &ImageSource) -> Result<Picture> {
             let name = name.map(|name| name.to_string_lossy().into_owned());
             (name.unwrap_or_default(), place.read("image")?)
         }
-        ImageSource::Embedded { bytes, .. } => (format!("image {index}"), bytes.clone()),
+        ImageSource::Embedded { buffer, range, .. } => {
+            let bytes = buffer.get(range.clone()).unwrap_or_default();
+            (format!("image {index}"), bytes.to_vec())
+        }
         ImageSource::Lost(why) => {
             return Err(Diagnostic::error(format!(
                 "cannot read image {index} of the model: {why}"

@@ -21,7 +21,9 @@ use crate::{Diagnostic, Result};
 pub(super) use bytes::MOST_BYTES;
 use bytes::Place;
 use serde_json::Value;
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A model as a scene needs it.
 #[derive(Clone, Debug)]
@@ -68,10 +70,11 @@ impl Tables {
 #[derive(Clone, Debug)]
 enum ImageSource {
     File(Place),
-    /// In the bytes of a file of the model, named from the scene.
+    /// In the bytes of a file of the model, named from the scene. Any number of images may be in the same bytes.
     Embedded {
         file: String,
-        bytes: Vec<u8>,
+        buffer: Arc<Vec<u8>>,
+        range: Range<usize>,
     },
     /// Nowhere that can be read, and why.
     Lost(String),
@@ -179,8 +182,16 @@ impl Model {
                     file: place.name.clone(),
                 })
             }
-            Some(ImageSource::Embedded { file, bytes }) => Ok(Decoded {
-                image: decode(&format!("{file}, image {index}"), bytes, space)?,
+            Some(ImageSource::Embedded {
+                file,
+                buffer,
+                range,
+            }) => Ok(Decoded {
+                image: decode(
+                    &format!("{file}, image {index}"),
+                    buffer.get(range.clone()).unwrap_or_default(),
+                    space,
+                )?,
                 hash: None,
                 file: file.clone(),
             }),

@@ -5,12 +5,13 @@
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::buffer::View;
+use std::sync::Arc;
 
 /// The most entries that an accessor may have: as many as a mesh may have corners.
 pub(super) const MOST_ENTRIES: usize = 3 * super::MOST_TRIANGLES;
 
 /// The bytes of every buffer, by its index.
-pub(super) type Buffers = [Vec<u8>];
+pub(super) type Buffers = [Arc<Vec<u8>>];
 
 /// Vectors of `N` floats; integers are converted as glTF says, normalised where the file says so.
 ///

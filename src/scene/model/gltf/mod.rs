@@ -23,6 +23,7 @@ use glam::DMat4;
 use primitive::Part;
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// The most bytes of JSON, which takes several times as much when it is read.
 const MOST_JSON: usize = 128 << 20;
@@ -68,6 +69,7 @@ pub(super) fn read(place: &Place, file: &[u8], mut inputs: Vec<(String, String)>
         name,
         buffers: &buffers,
         triangles: 0,
+        vertices: 0,
         draws: Vec::new(),
         skipped: BTreeSet::new(),
         repaired: 0,
@@ -245,7 +247,7 @@ fn read_buffers(
     place: &Place,
     chunk: Option<&[u8]>,
     inputs: &mut Vec<(String, String)>,
-) -> Result<(Vec<Vec<u8>>, Vec<String>)> {
+) -> Result<(Vec<Arc<Vec<u8>>>, Vec<String>)> {
     let name = &place.name;
     let mut buffers = Vec::new();
     let mut files = Vec::new();
@@ -282,7 +284,7 @@ fn read_buffers(
                 buffer.length()
             )));
         }
-        buffers.push(bytes);
+        buffers.push(Arc::new(bytes));
         files.push(file);
     }
     Ok((buffers, files))
@@ -335,6 +337,7 @@ struct Reading<'r> {
     name: &'r str,
     buffers: &'r accessor::Buffers,
     triangles: usize,
+    vertices: usize,
     draws: Vec<(Option<usize>, Material, Vec<Part>)>,
     /// What is not drawn, or not as the file means it.
     skipped: BTreeSet<String>,
@@ -388,6 +391,14 @@ impl Reading<'_> {
                 return Err(refused(
                     self.name,
                     format!("it has more than {MOST_TRIANGLES} triangles"),
+                )
+                .with_note("export fewer objects, or a coarser one"));
+            }
+            self.vertices += part.positions.len();
+            if self.vertices > accessor::MOST_ENTRIES {
+                return Err(refused(
+                    self.name,
+                    format!("it has more than {} vertices", accessor::MOST_ENTRIES),
                 )
                 .with_note("export fewer objects, or a coarser one"));
             }
@@ -478,7 +489,8 @@ fn image_source(
             None => ImageSource::beside(place, &bytes::decoded(uri)),
             Some(Ok(bytes)) => ImageSource::Embedded {
                 file: place.name.clone(),
-                bytes,
+                range: 0..bytes.len(),
+                buffer: Arc::new(bytes),
             },
             Some(Err(why)) => ImageSource::Lost(why),
         };
@@ -487,12 +499,17 @@ fn image_source(
     let view = view.and_then(|index| document.views().nth(usize::try_from(index).ok()?));
     let found = view.and_then(|view| {
         let buffer = view.buffer().index();
-        let end = view.offset().checked_add(view.length())?;
-        let bytes = buffers.get(buffer)?.get(view.offset()..end)?;
-        Some((files.get(buffer)?.clone(), bytes.to_vec()))
+        let range = view.offset()..view.offset().checked_add(view.length())?;
+        let bytes = buffers.get(buffer)?;
+        bytes.get(range.clone())?;
+        Some(ImageSource::Embedded {
+            file: files.get(buffer)?.clone(),
+            buffer: Arc::clone(bytes),
+            range,
+        })
     });
     match found {
-        Some((file, bytes)) => ImageSource::Embedded { file, bytes },
+        Some(found) => found,
         None => ImageSource::Lost("its bytes are not there".to_owned()),
     }
 }
