@@ -15,6 +15,8 @@ mod directives;
 mod init;
 #[cfg(feature = "search")]
 mod kept;
+#[cfg(feature = "mesh")]
+mod mesh;
 #[cfg(feature = "search")]
 mod model_file;
 #[cfg(feature = "search")]
@@ -33,6 +35,11 @@ pub use clock::Timings;
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
+#[cfg(feature = "mesh")]
+pub use mesh::{
+    Length, MeshError, MeshGoals, MeshLevel, MeshRequest, SimplifiedMesh, Simplifying, mesh,
+    mesh_error,
+};
 #[cfg(feature = "search")]
 pub use model_file::ModelFile;
 #[cfg(feature = "search")]

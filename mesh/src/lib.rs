@@ -5,6 +5,7 @@
 //! bytes --read--> Mesh           of OBJ and PLY files
 //! Mesh --surface--> Surface      its points, edges and seams; loses one edge after another, and is a Mesh again
 //! Surface --simplify--> Surface  by its geometry alone, under a bound that is proved
+//! Mesh --subdivide--> Mesh       with four triangles for each
 //! Mesh x Mesh --distance--> how far they are apart
 //! [Level] --write--> a GLB of all levels, and a table of their distances
 //! ```
@@ -22,11 +23,13 @@ pub mod read;
 #[cfg(test)]
 mod shapes;
 pub mod simplify;
+mod subdivide;
 mod surface;
 mod tree;
 pub mod write;
 
 pub use appearance::{CHANNELS, Quadrics, Weights, channels};
 pub use mesh::{Draw, Mesh};
+pub use subdivide::subdivide;
 pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};
 pub use tree::{Nearest, Tree, nearest_in_triangle};

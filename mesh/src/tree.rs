@@ -157,6 +157,10 @@ fn split(
 
 /// The point of a triangle that is nearest to a place.
 pub fn nearest_in_triangle(to: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+    // Exactly itself, where it is a corner.
+    if to == a || to == b || to == c {
+        return to;
+    }
     // Inside, when it is on the inner side of each edge as seen along the normal.
     let normal = (b - a).cross(c - a);
     let square = normal.length_squared();
@@ -223,6 +227,11 @@ mod tests {
             DVec3::X * 1.5
         );
         assert_eq!(nearest_in_triangle(DVec3::Y, [DVec3::X; 3]), DVec3::X);
+        let corner = DVec3::new(0.1, 0.7, 0.3);
+        assert_eq!(
+            nearest_in_triangle(corner, [DVec3::X * 0.7, corner, DVec3::Y * 0.3]),
+            corner
+        );
     }
 
     #[test]

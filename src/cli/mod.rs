@@ -3,6 +3,8 @@
 mod calibrate;
 #[cfg(feature = "gpu")]
 mod child;
+#[cfg(feature = "mesh")]
+mod mesh;
 mod progress;
 
 use crate::compile::{
@@ -51,6 +53,12 @@ enum Command {
     Snapshot(SnapshotArgs),
     /// Times variants of shaders on a GPU, and fits the cost model to it
     Calibrate(calibrate::CalibrateArgs),
+    /// Makes simpler levels of a model's mesh, and says how far each is from the original
+    #[cfg(feature = "mesh")]
+    Mesh(mesh::MeshArgs),
+    /// Measures how far the mesh of one model is from that of another
+    #[cfg(feature = "mesh")]
+    MeshError(mesh::MeshErrorArgs),
     /// Draws on the GPU for the process that started it
     #[cfg(feature = "gpu")]
     #[command(hide = true)]
@@ -423,6 +431,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             Err(error) => Err(error),
         },
         Some(Command::Calibrate(arguments)) => calibrate::run(arguments),
+        #[cfg(feature = "mesh")]
+        Some(Command::Mesh(arguments)) => mesh::run(arguments),
+        #[cfg(feature = "mesh")]
+        Some(Command::MeshError(arguments)) => mesh::error(arguments),
         #[cfg(feature = "gpu")]
         Some(Command::GpuWorker) => gpu_worker(),
         None => compile_command(cli.compile),
@@ -652,7 +664,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
             .for_each(|warning| print_diagnostic(warning));
         return write(&files, quiet);
     }
-    let bar = Bar::new(quiet);
+    let bar = Bar::new("searching", quiet);
     let compiled = compile::compile(&request, &|progress| bar.show(progress));
     bar.finish();
     let compiled = compiled?;

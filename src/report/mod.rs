@@ -6,10 +6,14 @@
 mod calibration;
 mod comparison;
 mod exact;
+#[cfg(feature = "mesh")]
+mod meshes;
 mod terminal;
 
 pub use calibration::calibration;
 pub use comparison::{ComparedAt, Comparison};
+#[cfg(feature = "mesh")]
+pub use meshes::{mesh_error, mesh_error_json, mesh_levels};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::emit::LockedGenerated;
