@@ -16,12 +16,11 @@ const MOST_HEADER: usize = 64 << 10;
 /// What is wrong, with the line of the header or the element, to be put behind the model's name.
 pub fn ply(bytes: &[u8]) -> Result<Model, String> {
     let (header, body) = Header::read(bytes)?;
-    let mut reading = Reading::default();
-    reading.vertices = header
-        .elements
-        .iter()
-        .find(|e| e.name == "vertex")
-        .map_or(0, |e| e.count);
+    let vertices = header.elements.iter().find(|e| e.name == "vertex");
+    let mut reading = Reading {
+        vertices: vertices.map_or(0, |element| element.count),
+        ..Reading::default()
+    };
     let mut body = Body {
         bytes: body,
         format: header.format,

@@ -10,8 +10,11 @@ use std::sync::Arc;
 /// The most entries that an accessor may have: as many as a mesh may have corners.
 pub(super) const MOST_ENTRIES: usize = 3 * super::MOST_TRIANGLES;
 
+/// The bytes of a buffer, which images may be in.
+pub(super) type Bytes = Arc<Vec<u8>>;
+
 /// The bytes of every buffer, by its index.
-pub(super) type Buffers = [Arc<Vec<u8>>];
+pub(super) type Buffers = [Bytes];
 
 /// Vectors of `N` floats; integers are converted as glTF says, normalised where the file says so.
 ///

@@ -87,12 +87,16 @@ pub(super) fn read(place: &Place, file: &[u8], mut inputs: Vec<(String, String)>
                 reading.repaired
             )));
     }
-    let (mesh, of_draws, bare) = merge(reading.draws);
+    let Merged {
+        mesh,
+        of_draws,
+        materials,
+        bare,
+    } = merge(reading.draws);
     if mesh.indices.is_empty() {
         return Err(refused(name, "it has no triangles".to_owned())
             .with_note("its default scene must have a mesh of triangles"));
     }
-    let (of_draws, materials): (Vec<_>, Vec<Material>) = of_draws.into_iter().unzip();
     for material in &materials {
         warnings.extend(about(name, material));
     }
@@ -247,7 +251,7 @@ fn read_buffers(
     place: &Place,
     chunk: Option<&[u8]>,
     inputs: &mut Vec<(String, String)>,
-) -> Result<(Vec<Arc<Vec<u8>>>, Vec<String>)> {
+) -> Result<(Vec<accessor::Bytes>, Vec<String>)> {
     let name = &place.name;
     let mut buffers = Vec::new();
     let mut files = Vec::new();
@@ -409,14 +413,20 @@ impl Reading<'_> {
     }
 }
 
-/// One mesh of all primitives, those of a material together; the material of each draw, with its place in the file;
-/// and the draws that lack tangents.
-fn merge(
-    draws: Vec<(Option<usize>, Material, Vec<Part>)>,
-) -> (Mesh, Vec<(Option<usize>, Material)>, Vec<usize>) {
-    let mut mesh = Mesh::default();
-    let mut materials = Vec::new();
-    let mut bare = Vec::new();
+/// All primitives, those of a material together.
+#[derive(Default)]
+struct Merged {
+    mesh: Mesh,
+    /// Of each draw the place of its material in the file, and the material.
+    of_draws: Vec<Option<usize>>,
+    materials: Vec<Material>,
+    /// The draws that lack tangents.
+    bare: Vec<usize>,
+}
+
+fn merge(draws: Vec<(Option<usize>, Material, Vec<Part>)>) -> Merged {
+    let mut merged = Merged::default();
+    let mesh = &mut merged.mesh;
     let all = || draws.iter().flat_map(|(_, _, parts)| parts);
     let second = all().any(|part| !part.second_uvs.is_empty());
     for (index, material, parts) in &draws {
@@ -448,15 +458,16 @@ fn merge(
             continue;
         }
         if !whole {
-            bare.push(materials.len());
+            merged.bare.push(merged.materials.len());
         }
-        materials.push((*index, material.clone()));
+        merged.of_draws.push(*index);
+        merged.materials.push(material.clone());
         mesh.draws.push(Draw {
             vertices: vertices..mesh.positions.len(),
             triangles: triangles..mesh.indices.len() / 3,
         });
     }
-    (mesh, materials, bare)
+    merged
 }
 
 /// What of a material is not drawn as it is meant.
