@@ -578,6 +578,30 @@ mod tests {
     }
 
     #[test]
+    fn simplified_levels_add_indices_and_no_vertices() {
+        let fine = crate::shapes::sphere(80, 40);
+        let mut simplifier = crate::simplify::Simplifier::new(&fine);
+        let mut meshes = vec![fine.clone()];
+        for share in [2, 4, 8] {
+            simplifier.to_triangles(fine.indices.len() / 3 / share, &mut |_| {});
+            meshes.push(simplifier.mesh());
+        }
+        let levels: Vec<Level> = meshes
+            .iter()
+            .zip(1..)
+            .map(|(mesh, d)| level(mesh, f64::from(d)))
+            .collect();
+        let write = |levels: &[Level]| {
+            glb(levels, &Sight::default(), &Looks::default())
+                .unwrap()
+                .len()
+        };
+        let (all, one) = (write(&levels), write(&levels[..1]));
+        let indices: usize = meshes[1..].iter().map(|mesh| 2 * mesh.indices.len()).sum();
+        assert!(all <= one + indices + 6_000, "{all} {one} {indices}");
+    }
+
+    #[test]
     fn levels_of_another_make_have_vertices_of_their_own() {
         let fine = strip(50);
         let mut other = coarse(50);
