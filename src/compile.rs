@@ -22,6 +22,8 @@ mod model_file;
 #[cfg(feature = "search")]
 mod search;
 mod snapshot;
+#[cfg(feature = "search")]
+mod stability;
 mod textures;
 #[cfg(feature = "search")]
 mod transition;
@@ -45,6 +47,8 @@ pub use model_file::ModelFile;
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect, trajectory};
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
+#[cfg(feature = "search")]
+pub use stability::{Stability, StabilityRequest, stability};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target, Transition};
 use crate::front::{self, Modules, Source, Stages};
@@ -141,6 +145,8 @@ pub struct Request {
     pub model: Option<PathBuf>,
     /// What is never folded, simplified or left out: uniforms, textures, values, functions.
     pub keep: Vec<String>,
+    /// Whether levels may fail on inputs that no picture shows and on which the original holds.
+    pub unstable: bool,
     /// The command that reproduces the result, for the report.
     pub command: String,
 }

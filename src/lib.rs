@@ -31,4 +31,6 @@ pub mod scene;
 #[cfg(feature = "search")]
 pub mod search;
 #[cfg(feature = "search")]
+pub mod stability;
+#[cfg(feature = "search")]
 pub mod time;

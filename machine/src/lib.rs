@@ -13,4 +13,6 @@ pub mod lane;
 pub mod machine;
 pub mod mix;
 pub mod program;
+pub mod rough;
+pub mod shadow;
 pub mod texture;

@@ -9,7 +9,7 @@ mod progress;
 
 use crate::compile::{
     self, CompareRequest, DrawnBy, InitRequest, Measuring, Recorded, Request, RunTime,
-    SnapshotRequest,
+    SnapshotRequest, StabilityRequest,
 };
 use crate::emit::{self, Form, Target, Transition};
 use crate::front::{Definition, Modules, Stages};
@@ -51,6 +51,8 @@ enum Command {
     Init(InitArgs),
     /// Writes one level of a lock as a shader of its own, and says what it needs bound
     Snapshot(SnapshotArgs),
+    /// Looks for inputs on which a shader, or a level of its lock, is not finite
+    Stability(StabilityArgs),
     /// Times variants of shaders on a GPU, and fits the cost model to it
     Calibrate(calibrate::CalibrateArgs),
     /// Makes simpler levels of a model's mesh, and says how far each is from the original
@@ -100,6 +102,21 @@ struct SnapshotArgs {
     /// The language to write [default: the lock's]
     #[arg(long, value_enum)]
     target: Option<Target>,
+}
+
+#[derive(Debug, Args)]
+struct StabilityArgs {
+    #[command(flatten)]
+    input: InputArgs,
+    /// The lock whose levels are looked at [default: beside the source, with .lod.toml, if it is there]
+    #[arg(long, value_name = "FILE")]
+    lock: Option<PathBuf>,
+    /// Looks at the inputs of a file, too, which --record has written
+    #[arg(long, value_name = "FILE")]
+    replay: Option<PathBuf>,
+    /// Writes the inputs that something fails on to a file
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -264,6 +281,9 @@ struct CompileArgs {
     /// How much memory the textures that are made for a level may take together, with their MIP levels
     #[arg(long, value_name = "MIB")]
     max_texture_memory: Option<u32>,
+    /// Writes levels that fail on inputs that no picture shows, though the original holds them
+    #[arg(long)]
+    allow_unstable: bool,
     #[command(flatten)]
     time: TimeArgs,
     /// Writes the shader from the committed lock, without a search
@@ -427,6 +447,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Init(arguments)) => init(arguments),
         Some(Command::Snapshot(arguments)) => snapshot(arguments),
         Some(Command::Compare(compared)) => match compare(compared, &arguments) {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
+        Some(Command::Stability(arguments)) => match stability(arguments) {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
@@ -627,6 +651,30 @@ fn compare(arguments: CompareArgs, all: &[OsString]) -> Result<ExitCode> {
     })
 }
 
+/// Looks for inputs that break a shader or its levels. Exit code 1 when a level fails where the original holds.
+fn stability(arguments: StabilityArgs) -> Result<ExitCode> {
+    let asked = StabilityRequest {
+        request: Request {
+            output: arguments.lock,
+            ..arguments.input.request()?
+        },
+        replay: arguments.replay,
+        record: arguments.record,
+    };
+    let found = compile::stability(&asked)?;
+    for diagnostic in found.warnings.iter().chain(&found.findings) {
+        print_diagnostic(diagnostic);
+    }
+    print(&found.table());
+    if !found.files.is_empty() {
+        write(&found.files, false)?;
+    }
+    Ok(match found.fails() {
+        true => ExitCode::from(1),
+        false => ExitCode::SUCCESS,
+    })
+}
+
 fn compile_command(arguments: CompileArgs) -> Result<()> {
     let mut request = arguments.input.request()?;
     request.output = arguments.output;
@@ -651,6 +699,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
         }
     };
     request.keep = arguments.keep;
+    request.unstable = arguments.allow_unstable;
     request.goal = arguments.goal;
     request.only = arguments.only;
     request.command = command_line();

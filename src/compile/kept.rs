@@ -19,6 +19,7 @@ impl Ready {
     pub(super) fn kept(&self, request: &Request) -> Result<Kept> {
         let mut kept = Kept {
             only: passes(&request.only)?,
+            unstable: request.unstable,
             same_vertex_stage: request.per_pixel,
             apart: request.transition.unwrap_or_default() != Transition::Pop,
             ..Kept::default()

@@ -263,6 +263,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let visible = to_be_visible(&ready.base, found.levels.iter().map(|level| &level.shader));
     let many = too_many(&ready.base, textures.len(), emission);
     let limit = limits_nothing(&ready.scene);
+    of_time.extend(ready.unstable(&found));
     let visible = visible.into_iter().chain(many).chain(of_time);
     let visible: Vec<Box<Diagnostic>> = visible.chain(limit).collect();
     origin
@@ -359,6 +360,21 @@ fn emit_level(level: &Level, says: &str) -> EmitLevel {
 }
 
 impl Ready {
+    /// Warns of levels that fail where the original holds, which only happens where that is allowed.
+    fn unstable(&self, found: &Found) -> Vec<Box<Diagnostic>> {
+        let levels = found.levels.iter().flat_map(|level| {
+            let all = level.unstable.iter();
+            all.map(|blamed| (level.autolod, blamed))
+        });
+        let warned = levels.map(|(autolod, blamed)| {
+            let warning = blamed.diagnostic(&self.base, &self.source);
+            warning.with_note(format!(
+                "THE LEVEL FROM AUTOLOD {autolod} ON IS UNSTABLE, and the original is not: leave `--allow-unstable` out"
+            ))
+        });
+        warned.collect()
+    }
+
     /// How far the mesh's texture coordinates go from pixel to pixel at the nearest distance, where autoLOD is 0.
     fn coordinates_per_pixel(&self) -> Result<f32> {
         let scale = coordinates_per_pixel(&self.scene, self.scene.nearest);

@@ -15,5 +15,5 @@ pub mod parameters;
 pub mod raster;
 mod refused;
 
-pub use lodc_machine::{lane, machine, mix, program, texture};
+pub use lodc_machine::{lane, machine, mix, program, rough, shadow, texture};
 pub use refused::refusal;

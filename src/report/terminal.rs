@@ -176,6 +176,7 @@ pub fn summary(report: &Report) -> String {
     }
     out.push_str(&exact(report));
     out.push_str(&held_out(report));
+    out.push_str(&stability(report));
     out.push_str(&transitions(report));
     if report.bound == "paper" {
         out.push_str("  the bound is read as Liang's paper reads it: three times the squared error, the floor in it\n");
@@ -189,6 +190,32 @@ pub fn summary(report: &Report) -> String {
     }
     out.push('\n');
     out
+}
+
+/// How the levels stand beyond the pictures.
+fn stability(report: &Report) -> String {
+    let mut text = String::new();
+    let mut stable = 0;
+    let mut inputs = u64::MAX;
+    for level in &report.levels {
+        let stability = &level.stability;
+        inputs = inputs.min(stability.inputs.unwrap_or(inputs));
+        match stability.worst.first() {
+            Some(worst) => {
+                let at = level.autolod;
+                let _ = writeln!(text, "  UNSTABLE from autoLOD {at} on: {worst}");
+            }
+            None => stable += 1,
+        }
+    }
+    if stable == report.levels.len() && inputs < u64::MAX {
+        let rate = 3.0 / inputs.max(1) as f64;
+        let _ = writeln!(
+            text,
+            "  no level fails on an input on which the original holds: under {rate:.1e} of inputs at 95 %"
+        );
+    }
+    text
 }
 
 /// What the costs are.

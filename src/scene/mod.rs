@@ -25,6 +25,7 @@ mod settings;
 mod shader;
 mod textures;
 
+pub(crate) use buffers::Freedom;
 pub use buffers::{Draw, Uniform, Variation};
 pub use images::{Files, ImageAnswer, ImageSource};
 pub use lighting::SceneLighting;
@@ -625,6 +626,23 @@ impl Scene {
             },
             baked: self.baked.clone(),
         }
+    }
+
+    /// What may be put into the buffers' parts of floats, where they are not always the same.
+    pub(crate) fn freedoms(&self) -> Vec<Freedom> {
+        self.buffers.iter().flat_map(Buffer::freedoms).collect()
+    }
+
+    /// Fills what is computed from other buffers anew, after those have changed.
+    pub(crate) fn refill(&self, bindings: &mut Bindings, draws: usize) {
+        for stage in &self.filled {
+            stage.bind(bindings, draws);
+        }
+    }
+
+    /// The eye of a frame in world space.
+    pub(crate) fn eye(&self, frame: &Frame) -> DVec3 {
+        self.pose(frame.shot.direction, frame.shot.distance).eye
     }
 
     /// The samplers that repeat along both axes in every draw, by their names.

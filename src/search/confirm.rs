@@ -4,7 +4,7 @@
 use super::descend::Confirmed;
 use super::guard::Guard;
 use super::kept::Kept;
-use super::levels::{Level, threshold};
+use super::levels::{Level, Struck, threshold};
 use super::parameters;
 use super::programs::Programs;
 use super::samples::{Measured, SampleSet, Samples, Stand};
@@ -12,6 +12,7 @@ use super::textures;
 use crate::error::{Details, exceeds};
 use crate::eval::program::Refused;
 use crate::scene::Split;
+use crate::stability::{Battery, Failure};
 use lodc_passes::{Recipe, Shader};
 
 /// The samples of one interval.
@@ -23,6 +24,8 @@ pub(super) struct Checks<'a> {
     full: [SampleSet<'a>; 3],
     /// The validation split, at the start and at the end.
     validation: [SampleSet<'a>; 2],
+    /// What it has to hold, where that is asked.
+    battery: Option<&'a Battery<'a>>,
 }
 
 /// What the checks say of a variant.
@@ -31,6 +34,8 @@ pub(super) struct Verdict {
     /// What all samples say of its mean error and of its worst view: how much of its bound it uses up, the most in its
     /// interval.
     pub(super) strain_of_means: f64,
+    /// The input that it fails on, where it is unstable.
+    pub(super) failure: Option<Failure>,
     /// What was measured at each place of the interval.
     details: Vec<Details>,
 }
@@ -48,6 +53,8 @@ pub(super) enum Finding {
     Over,
     /// Within its bound on the scene's samples, and over it on the validation split.
     Withdrawn,
+    /// Within its bound, and not finite on an input on which the original is.
+    Unstable,
 }
 
 impl<'a> Checks<'a> {
@@ -57,6 +64,7 @@ impl<'a> Checks<'a> {
         stand: &'a Stand<'a>,
         base: &'a Shader,
         [start, middle, end]: [f64; 3],
+        battery: Option<&'a Battery<'a>>,
         before: Option<Self>,
     ) -> Result<Self, Refused> {
         let full = |distance| SampleSet::new(stand, distance, Samples::Full);
@@ -75,6 +83,7 @@ impl<'a> Checks<'a> {
             base,
             full: [first, full(middle)?, full(end)?],
             validation: [first_unseen, unseen(end)?],
+            battery,
         })
     }
 
@@ -118,6 +127,7 @@ impl<'a> Checks<'a> {
         let mut verdict = Verdict {
             finding: Finding::Over,
             strain_of_means: 0.0,
+            failure: None,
             details: Vec::new(),
         };
         let mut strain = 0.0_f64;
@@ -146,7 +156,41 @@ impl<'a> Checks<'a> {
                 }
             }
         }
+        if let (Finding::Confirmed(_), Some(battery)) = (verdict.finding, self.battery) {
+            let failures = battery.judge(shader)?.failures;
+            if let Some(failure) = failures.into_iter().next() {
+                battery.remember(failure.clone());
+                verdict.failure = Some(failure);
+                verdict.finding = Finding::Unstable;
+            }
+        }
         Ok(verdict)
+    }
+
+    /// Hunts for an input on which what was confirmed fails, and why it does.
+    pub(super) fn hunt(&self, found: &Confirmed) -> Result<Option<Struck>, Refused> {
+        let Some(battery) = self.battery else {
+            return Ok(None);
+        };
+        let Ok(shader) = found.recipe.replay(self.base) else {
+            return Ok(None);
+        };
+        let (_, failure) = battery.hunt(&shader)?;
+        let struck = failure.map(|failure| {
+            let struck = self.struck(&found.recipe, &failure);
+            battery.remember(failure);
+            struck
+        });
+        Ok(struck.flatten())
+    }
+
+    /// Why a variant fails on an input.
+    pub(super) fn struck(&self, recipe: &Recipe, failure: &Failure) -> Option<Struck> {
+        let battery = self.battery?;
+        Some(Struck {
+            recipe: recipe.clone(),
+            blamed: battery.blame((self.base, recipe), failure),
+        })
     }
 
     /// Has a guard keep what spoke against a variant.
@@ -184,6 +228,7 @@ impl<'a> Checks<'a> {
         let mut shader = recipe.replay(self.base).ok()?;
         let mut measured = *measured;
         let original = start.original();
+        let mut stability = None;
         let mut with_parameters = None;
         if let Some((longer, moved)) = parameters::with_exact(&recipe, &shader, kept)
             && let Ok(less) = start.measure(&moved)
@@ -204,7 +249,16 @@ impl<'a> Checks<'a> {
         {
             with_textures = Some(start.share(less.cost));
         }
+        if let Some(battery) = self.battery {
+            let judged = battery.judge(&shader).ok()?;
+            if !judged.failures.is_empty() {
+                return None;
+            }
+            stability = Some(judged);
+        }
         Some(Level {
+            stability,
+            unstable: Vec::new(),
             autolod: threshold(self.stand.scene, distance),
             distance,
             is_original: false,

@@ -14,6 +14,7 @@ use super::frontier::Frontier;
 use super::greedy::{Descent, Prices, Stop, Variant};
 use super::guard::Guard;
 use super::interval::Interval;
+use super::levels::Struck;
 use super::samples::Measured;
 use crate::eval::program::Refused;
 use lodc_passes::{Candidate, Recipe, Shader, recipe};
@@ -27,6 +28,8 @@ const SHORTCUT: f64 = 0.99;
 const REPAIRS: usize = 2;
 /// The part of its load that a variant is relieved of then.
 const RELIEF: f64 = 0.3;
+/// Of how many unstable variants of an interval it is said why.
+const MOST_STRUCK: usize = 4;
 
 /// A variant that all samples confirmed, with what they say of it where the interval starts.
 pub(super) struct Confirmed {
@@ -50,6 +53,8 @@ pub(super) struct Bottom<'a, 'b> {
     pub(super) variants: u64,
     /// How many variants the validation split withdrew.
     pub(super) withdrawn: usize,
+    /// Some of those that are unstable.
+    pub(super) struck: Vec<Struck>,
     /// Told how many variants have been measured, and the share of the original's cost that is left.
     pub(super) progress: &'a (dyn Fn(u64, f64) + Sync),
 }
@@ -126,7 +131,9 @@ impl Bottom<'_, '_> {
                     last.forget();
                 }
             } else {
-                self.checks.teach(self.guard, &last.measured, &verdict)?;
+                if verdict.failure.is_none() {
+                    self.checks.teach(self.guard, &last.measured, &verdict)?;
+                }
                 while let Some(Stop { variant, .. }) = way.last().filter(|_| way.len() > 1)
                     && !self.guard.allows(&variant.shader, &variant.measured)
                 {
@@ -152,7 +159,7 @@ impl Bottom<'_, '_> {
                 let middle = low + (high - low) / 2;
                 match self.judge(&way[middle].variant)?.finding {
                     Finding::Confirmed(_) => low = middle + 1,
-                    Finding::Over | Finding::Withdrawn => high = middle,
+                    Finding::Over | Finding::Withdrawn | Finding::Unstable => high = middle,
                 }
             }
         }
@@ -168,7 +175,13 @@ impl Bottom<'_, '_> {
                 self.found = Some(Confirmed { recipe, measured });
             }
             Finding::Withdrawn => self.withdrawn += 1,
-            Finding::Confirmed(_) | Finding::Over => {}
+            Finding::Confirmed(_) | Finding::Over | Finding::Unstable => {}
+        }
+        if let Some(failure) = &verdict.failure
+            && self.struck.len() < MOST_STRUCK
+        {
+            let struck = self.checks.struck(&variant.recipe, failure);
+            self.struck.extend(struck);
         }
         Ok(verdict)
     }

@@ -11,6 +11,7 @@ use super::samples::{Measured, SampleSet, Stand, Tiles};
 use crate::emit::shared_locations;
 use crate::error::Details;
 use crate::eval::program::Refused;
+use crate::stability::Battery;
 use lodc_passes::Shader;
 
 /// How many tiles of one distance are kept of a variant.
@@ -31,6 +32,8 @@ pub(crate) struct Guard<'a> {
     limit: f64,
     /// The levels that the shader has already: what all hand over from stage to stage has to have room.
     levels: Vec<Shader>,
+    /// What a variant has to hold beyond the pictures.
+    battery: Option<&'a Battery<'a>>,
 }
 
 impl<'a> Guard<'a> {
@@ -42,7 +45,13 @@ impl<'a> Guard<'a> {
             tiles: Vec::new(),
             limit: 1.0,
             levels: Vec::new(),
+            battery: None,
         }
+    }
+
+    /// Variants have to hold this, too.
+    pub(crate) fn with(self, battery: Option<&'a Battery<'a>>) -> Self {
+        Self { battery, ..self }
     }
 
     /// Nothing is over a bound: only what is to be kept counts.
@@ -91,6 +100,9 @@ impl<'a> Guard<'a> {
                 let mut sets = self.tiles.iter();
                 sets.all(|set| set.strain_of_tiles(&programs) <= 1.0)
             })
+            && self
+                .battery
+                .is_none_or(|battery| battery.allows(shader).unwrap_or(false))
     }
 
     /// Keeps the tiles of a set that speak against a variant.

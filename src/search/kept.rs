@@ -21,6 +21,8 @@ pub struct Kept {
     pub(crate) only: BTreeSet<String>,
     /// Whether levels have the original's vertex stage.
     pub(crate) same_vertex_stage: bool,
+    /// Whether levels may be unstable where the original is not.
+    pub(crate) unstable: bool,
     /// Whether neighbouring levels are drawn together somewhere, so that they share no value between the stages.
     pub(crate) apart: bool,
 }

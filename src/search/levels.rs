@@ -19,12 +19,16 @@ use super::timed::{Timed, Times};
 use crate::error::{ErrorFigures, HeldOut};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
+use crate::stability::{Battery, Blamed, Judged};
 use crate::time::clock::{Clock, is_faster, worst_ratio};
 use crate::time::{Timing, Verdict};
 use lodc_passes::{Recipe, Shader, Used};
 
 /// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
 const MERGE_BELOW: f64 = 0.04;
+
+/// How often an interval is searched anew because a hunt brought down what was found.
+const HUNTS: usize = 3;
 
 /// A level: a variant and the distance from which it is used.
 #[derive(Clone, Debug)]
@@ -60,6 +64,10 @@ pub struct Level {
     pub with_parameters: Option<f64>,
     /// The same with textures made for levels.
     pub with_textures: Option<f64>,
+    /// How it holds inputs beyond the pictures; nothing where it was not asked.
+    pub stability: Option<Judged>,
+    /// Why it is unstable, where it is and that is allowed.
+    pub unstable: Vec<Blamed>,
     /// For each step of the recipe, the RMSE after it, over the samples that the search looked at.
     pub error_after: Vec<f64>,
 }
@@ -83,6 +91,8 @@ impl Level {
             branching: Vec::new(),
             with_parameters: None,
             with_textures: None,
+            stability: None,
+            unstable: Vec::new(),
             error_after: Vec::new(),
         }
     }
@@ -141,6 +151,17 @@ pub struct AtDistance {
     /// How many variants were within the bound on all samples of the scene and were withdrawn, because on pictures
     /// that the search had not seen they were not.
     pub withdrawn: usize,
+    /// Variants that were within the bound, and fail on an input on which the original holds.
+    pub struck: Vec<Struck>,
+}
+
+/// A variant that was struck off, since it is unstable.
+#[derive(Clone, Debug)]
+pub struct Struck {
+    /// How it is made from what the exact tier made of the original.
+    pub recipe: Recipe,
+    /// Why.
+    pub blamed: Blamed,
 }
 
 /// Everything that a search found.
@@ -246,6 +267,7 @@ impl<'a> Chain<'a> {
             found: None,
             variants: tally.variants,
             withdrawn: tally.withdrawn,
+            struck: std::mem::take(&mut tally.struck),
             progress,
         };
         // What draws the same for less may be a level by itself.
@@ -259,7 +281,19 @@ impl<'a> Chain<'a> {
                 starts.push(plain);
             }
         }
-        bottom.find(&base, starts)?;
+        bottom.find(&base, starts.clone())?;
+        for hunts in 1.. {
+            let found = bottom.found.as_ref();
+            let Some(struck) = found.map(|found| checks.hunt(found)).transpose()?.flatten() else {
+                break;
+            };
+            bottom.struck.push(struck);
+            bottom.found = None;
+            if hunts == HUNTS {
+                break;
+            }
+            bottom.find(&base, starts.clone())?;
+        }
         let timed = match &mut times {
             Some(times) => bottom.choose_by(times)?,
             None => Timed::default(),
@@ -268,6 +302,7 @@ impl<'a> Chain<'a> {
             frontier,
             found,
             withdrawn,
+            struck,
             variants,
             ..
         } = bottom;
@@ -275,6 +310,7 @@ impl<'a> Chain<'a> {
             frontier,
             variants,
             withdrawn,
+            struck,
         };
         let found = found.and_then(|found| checks.level(&found, search.start(), kept, self.asks));
         // What vertices do weighs more the farther away it is.
@@ -346,6 +382,7 @@ struct Tally {
     frontier: Frontier,
     variants: u64,
     withdrawn: usize,
+    struck: Vec<Struck>,
 }
 
 /// Searches the levels of a shader in a scene: what costs no error first, then greedy at each distance, every variant that
@@ -390,7 +427,10 @@ pub fn find(
     };
     drop(nearest);
     let mut seen = Vec::new();
-    let chain = |asks| Chain::new(asks, first.clone(), Guard::new(stand, kept));
+    let whole = Battery::new(stand)?;
+    let battery = Some(&whole).filter(|_| !kept.unstable);
+    let guard = || Guard::new(stand, kept).with(battery);
+    let chain = |asks| Chain::new(asks, first.clone(), guard());
     let mut without = (scene.host.parameters || scene.host.textures).then(|| chain(false));
     let mut chain = chain(true);
     let (mut variants, mut timed_variants) = (0, 0);
@@ -400,7 +440,7 @@ pub fn find(
         let middle = (distance * next).sqrt();
         let search = Interval::new(stand, &[distance, next], Samples::Search)?;
         let places = [distance, middle, next];
-        let checks = Checks::new(stand, &exact.shader, places, before_checks.take())?;
+        let checks = Checks::new(stand, &exact.shader, places, battery, before_checks.take())?;
         let place = Place {
             stand,
             exact: &exact,
@@ -445,9 +485,13 @@ pub fn find(
             frontier: tally.frontier.members().to_vec(),
             timed: timed.frontier,
             withdrawn: tally.withdrawn,
+            struck: tally.struck,
         });
     }
-    let levels = chain.levels;
+    let mut levels = chain.levels;
+    for level in &mut levels {
+        stand_of(&whole, &exact, level)?;
+    }
     Ok(Found {
         exact,
         levels,
@@ -457,6 +501,25 @@ pub fn find(
         adapters: times.map_or_else(Vec::new, |times| times.clock.adapters().to_vec()),
         rho0: scene.rho0(),
     })
+}
+
+/// Says how a level stands that was not asked.
+fn stand_of(battery: &Battery<'_>, exact: &Exact, level: &mut Level) -> Result<(), Refused> {
+    if level.is_original {
+        level.stability = Some(battery.original_alone());
+    } else if level.stability.is_none() {
+        let mut judged = battery.judge(&level.shader)?;
+        if judged.failures.is_empty() {
+            battery.hunt_into(&level.shader, &mut judged)?;
+        }
+        let steps = exact.recipe.0.iter().chain(&level.recipe.0);
+        let recipe = Recipe(steps.cloned().collect());
+        let first = judged.failures.first();
+        let blamed = first.map(|failure| battery.blame((battery.base(), &recipe), failure));
+        level.unstable.extend(blamed);
+        level.stability = Some(judged);
+    }
+    Ok(())
 }
 
 /// The autoLOD of a distance as a threshold: rounded up to hundredths, so that it reads well and no level
@@ -534,7 +597,7 @@ mod tests {
         let places = [1.0, 1.5, 2.0].map(|times| distance * times);
         let search = Interval::new(&stand, &[distance, 2.0 * distance], Samples::Search);
         let search = search.expect("it runs");
-        let checks = Checks::new(&stand, &base, places, None).expect("it runs");
+        let checks = Checks::new(&stand, &base, places, None, None).expect("it runs");
         let kept = Kept {
             only: ["no pass".to_owned()].into(),
             ..Kept::default()

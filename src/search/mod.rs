@@ -40,7 +40,7 @@ pub use greedy::try_each;
 pub use kept::Kept;
 pub(crate) use kept::is_within;
 pub(crate) use levels::threshold;
-pub use levels::{AtDistance, Found, Level, Progress, find};
+pub use levels::{AtDistance, Found, Level, Progress, Struck, find};
 pub use programs::Programs;
 pub use samples::{Measured, OverBlack, SampleSet, Samples, Stand};
 pub use trajectory::{Step, trajectory};

@@ -14,9 +14,9 @@ use std::collections::BTreeSet;
 /// What draws a variant over fragments that its original was rasterised to.
 #[derive(Debug)]
 pub struct Programs {
-    pub(super) fragment: Program,
+    pub(crate) fragment: Program,
     /// The vertex stage, and its identity where it is known; none where it is the original's.
-    pub(super) vertex: Option<(Program, Option<Fingerprint>)>,
+    pub(crate) vertex: Option<(Program, Option<Fingerprint>)>,
     /// What handing over costs a fragment beside what it costs the original's, in full-rate scalar operations.
     pub(super) handing_over: f64,
     /// What fills the block that the others read.
@@ -77,7 +77,7 @@ impl Programs {
 
     /// A frame with the parameters and the generated textures bound, and the work of the parameter stage for all of its
     /// draws, in full-rate scalar operations. What makes a texture works once and for all, so that it is not in it.
-    pub(super) fn bound<'f>(&self, frame: &'f Frame) -> (Cow<'f, Frame>, f64) {
+    pub(crate) fn bound<'f>(&self, frame: &'f Frame) -> (Cow<'f, Frame>, f64) {
         if self.parameters.is_none() && self.generated.is_empty() {
             return (Cow::Borrowed(frame), 0.0);
         }

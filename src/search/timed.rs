@@ -187,7 +187,7 @@ impl Bottom<'_, '_> {
             runner.finding = Some(finding);
             match finding {
                 Finding::Confirmed(_) => next.push(at),
-                Finding::Over | Finding::Withdrawn => runner.tried = true,
+                Finding::Over | Finding::Withdrawn | Finding::Unstable => runner.tried = true,
             }
             if next.len() == BATCH {
                 break;

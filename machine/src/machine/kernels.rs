@@ -306,3 +306,15 @@ impl Kernels for f32 {
         }
     }
 }
+
+impl Kernels for crate::shadow::Both {
+    fn apply(
+        _: Option<Vectors>,
+        registers: &mut Registers<Self>,
+        op: Op,
+        to: Register,
+        operands: [Register; 3],
+    ) {
+        one_by_one(registers, op, to, operands);
+    }
+}

@@ -12,6 +12,7 @@
 mod kernels;
 mod recall;
 mod textures;
+mod watch;
 
 use super::lane::{LANES, Lane, Mask, Words};
 use super::mix::Mix;
@@ -30,6 +31,7 @@ use textures::Scratch;
 pub use kernels::Kernels;
 use kernels::{Registers, Vectors};
 pub use recall::Recall;
+pub use watch::{Outcome, Watcher};
 
 /// Rounds of all loops together that a block may take; a shader that wants more is taken to
 /// never end.
@@ -200,6 +202,8 @@ pub struct Machine<'a, R = f32> {
     lost: u64,
     probes: Vec<Vec<Probe>>,
     pairs: Vec<Vec<Moments>>,
+    /// Who is shown each operation.
+    watcher: Option<&'a mut dyn Watcher<R>>,
 }
 
 impl<'a> Machine<'a> {
@@ -226,6 +230,19 @@ impl<'a, R: Lane> Machine<'a, R> {
     /// # Panics
     /// As [`Machine::new`].
     pub fn of_lanes(program: &'a Program, bindings: &'a Bindings, draw: usize) -> Self {
+        Self::watched(program, bindings, draw, None)
+    }
+
+    /// The same with somebody who is shown each operation, and may change what it gives.
+    ///
+    /// # Panics
+    /// As [`Machine::new`].
+    pub fn watched(
+        program: &'a Program,
+        bindings: &'a Bindings,
+        draw: usize,
+        watcher: Option<&'a mut dyn Watcher<R>>,
+    ) -> Self {
         let find = |&(group, binding): &(u32, u32)| match bindings
             .get(&(group, binding))
             .and_then(|resource| resource.of_draw(draw))
@@ -294,6 +311,7 @@ impl<'a, R: Lane> Machine<'a, R> {
                 .iter()
                 .map(|&components| vec![Moments::default(); components])
                 .collect(),
+            watcher,
         };
         for &(kind, register, bits) in &code.constants {
             match kind {
@@ -577,9 +595,18 @@ impl<'a, R: Lane> Machine<'a, R> {
     }
 
     fn instructions(&mut self, instructions: &[Instruction]) {
+        if self.watcher.is_some() {
+            return self.watched_instructions(instructions);
+        }
+        self.plain_instructions(instructions);
+    }
+
+    fn plain_instructions(&mut self, instructions: &[Instruction]) {
         for instruction in instructions {
             match *instruction {
-                Instruction::Op { op, to, operands } => {
+                Instruction::Op {
+                    op, to, operands, ..
+                } => {
                     if to.is_uniform() {
                         kernels::once(&mut self.registers, op, to, operands);
                     } else {

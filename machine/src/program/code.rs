@@ -149,6 +149,8 @@ pub(crate) enum Instruction {
         op: Op,
         to: Register,
         operands: [Register; 3],
+        /// The place of the expression of the entry point that it is of; `u32::MAX` when it is of none.
+        origin: u32,
     },
     /// A copy; where `masked`, only lanes that run get it.
     Copy {

@@ -23,6 +23,8 @@ pub(super) struct Value {
     pub(super) constant: Option<u32>,
     /// Whether it is the same for a whole draw: a constant, or computed from constants and buffers.
     pub(super) invariant: bool,
+    /// The place of the expression of the entry point that it was made for; [`NONE`] when it is none of its own.
+    pub(super) origin: u32,
 }
 
 /// A scalar variable of each lane, or an array of such that is indexed while the program runs.
@@ -153,6 +155,8 @@ pub(super) struct Ir {
     pub(super) discards: bool,
     /// Where the loop of each label is.
     pub(super) loops: Vec<(Label, Span)>,
+    /// What new values are made for, as [`Value::origin`].
+    pub(super) origin: u32,
 }
 
 impl Ir {
@@ -162,6 +166,7 @@ impl Ir {
             kind,
             constant: None,
             invariant: false,
+            origin: self.origin,
         });
         self.values.len() as Id - 1
     }

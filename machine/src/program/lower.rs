@@ -156,6 +156,8 @@ pub(super) struct Lowering<'a> {
     known: Vec<Known>,
     open: Open,
     nodes: usize,
+    /// How many calls are being inlined, one in another.
+    calls: u32,
     pub(super) span: Span,
 }
 
@@ -237,7 +239,10 @@ impl<'a> Lowering<'a> {
         };
         let mut lowering = Self {
             module,
-            ir: Ir::default(),
+            ir: Ir {
+                origin: NONE,
+                ..Ir::default()
+            },
             frame: globals,
             globals: None,
             variables: vec![None; module.global_variables.len()],
@@ -251,6 +256,7 @@ impl<'a> Lowering<'a> {
             known: Vec::new(),
             open: Open::default(),
             nodes: 0,
+            calls: 0,
             span: Span::UNDEFINED,
         };
         for (handle, _) in module.functions.iter() {
@@ -292,6 +298,7 @@ impl<'a> Lowering<'a> {
                     kind,
                     constant: Some(bits),
                     invariant: true,
+                    origin: NONE,
                 });
                 values.len() as Id - 1
             })
@@ -996,6 +1003,9 @@ impl<'a> Lowering<'a> {
             Statement::Emit(range) => {
                 for handle in range.clone() {
                     self.span = self.frame.expressions.get_span(handle);
+                    if self.calls == 0 {
+                        self.ir.origin = handle.index() as u32;
+                    }
                     let entity = self.evaluate(handle)?;
                     self.frame.values[handle.index()] = entity;
                     self.open.work += self.frame.facts.works[handle.index()];
@@ -1064,12 +1074,14 @@ impl<'a> Lowering<'a> {
                 }
                 let module = self.module;
                 let facts = self.facts_of(*function)?;
+                self.calls += 1;
                 let value = self.inline(
                     &module.functions[*function],
                     facts,
                     given,
                     Watched::default(),
                 )?;
+                self.calls -= 1;
                 if let Some(result) = result {
                     self.frame.values[result.index()] = value;
                     self.probe(*result)?;

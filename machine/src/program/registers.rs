@@ -554,6 +554,7 @@ impl Writer<'_> {
                 op: *op,
                 to: self.register(*result),
                 operands: operands.map(|id| self.register(id)),
+                origin: self.ir.values[*result as usize].origin,
             },
             Node::Get {
                 result,

@@ -15,6 +15,7 @@ mod part;
 mod quads;
 mod retained;
 mod shape;
+mod spots;
 #[cfg(test)]
 mod tests;
 mod triangle;
@@ -23,6 +24,7 @@ mod vertices;
 pub(crate) use quads::Quad;
 pub(crate) use retained::{Retained, Squares};
 pub(crate) use shape::{Shape, shape};
+pub(crate) use spots::{Spot, on_spots};
 #[cfg(feature = "gpu")]
 pub(crate) use vertices::attribute;
 pub(crate) use vertices::{hand_over_the_same, profile as vertex_profile};

@@ -2,7 +2,7 @@
 
 use super::{Attribute, Frame};
 use crate::eval::lane::{LANES, Mask, Words};
-use crate::eval::machine::{Machine, Profile};
+use crate::eval::machine::{Machine, Profile, Watcher};
 use crate::eval::program::{Program, Slot};
 use crate::scene::mesh::Mesh;
 use naga::{Binding, BuiltIn, ScalarKind};
@@ -24,9 +24,29 @@ pub(super) fn run(program: &Program, frame: &Frame) -> Vertices {
     run_some(program, frame, &all)
 }
 
+/// The same with somebody who is shown each operation.
+pub(super) fn run_watched(
+    program: &Program,
+    frame: &Frame,
+    watcher: Option<&mut dyn Watcher<f32>>,
+) -> Vertices {
+    let draws = frame.mesh.draws().into_iter();
+    let all: Vec<Vec<usize>> = draws.map(|draw| draw.vertices.collect()).collect();
+    run_chosen(program, frame, &all, watcher)
+}
+
 /// Runs the program over some vertices of each draw of the frame's mesh; what is made of them comes in the same order, draw
 /// by draw.
 pub(super) fn run_some(program: &Program, frame: &Frame, chosen: &[Vec<usize>]) -> Vertices {
+    run_chosen(program, frame, chosen, None)
+}
+
+fn run_chosen(
+    program: &Program,
+    frame: &Frame,
+    chosen: &[Vec<usize>],
+    mut watcher: Option<&mut dyn Watcher<f32>>,
+) -> Vertices {
     let mesh = &*frame.mesh;
     let count = chosen.iter().map(Vec::len).sum();
     let mut outputs = vec![Vec::with_capacity(count); program.outputs().len()];
@@ -34,7 +54,10 @@ pub(super) fn run_some(program: &Program, frame: &Frame, chosen: &[Vec<usize>]) 
     let mut inputs = vec![[0; LANES]; program.inputs().len()];
     let mut block = vec![[0; LANES]; program.outputs().len()];
     for (index, (draw, chosen)) in mesh.draws().into_iter().zip(chosen).enumerate() {
-        let mut machine = Machine::of_draw(program, &frame.bindings, index);
+        let watcher = watcher
+            .as_mut()
+            .map(|watcher| &mut **watcher as &mut dyn Watcher<f32>);
+        let mut machine = Machine::watched(program, &frame.bindings, index, watcher);
         for vertices in chosen.chunks(LANES) {
             for (words, slot) in inputs.iter_mut().zip(program.inputs()) {
                 feed(words, slot, (vertices, draw.vertices.start), frame);

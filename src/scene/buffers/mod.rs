@@ -110,6 +110,55 @@ pub struct Uniform {
     pub stated: Option<Vec<u32>>,
 }
 
+/// What may be put into a part of a buffer.
+#[derive(Clone, Debug)]
+pub(crate) struct Freedom {
+    leaf: Leaf,
+    /// Group and binding of the buffer.
+    pub(crate) at: (u32, u32),
+    /// What the scene computes it from, if it does.
+    pub(crate) semantic: Option<Semantic>,
+    /// Values that the scene has for it; the first and the last are the ends of what is meant, unless any value is.
+    pub(crate) values: Vec<Vec<f64>>,
+    /// Whether it may take any value.
+    pub(crate) is_any: bool,
+}
+
+impl Freedom {
+    /// Such as `material.roughness`.
+    pub(crate) fn path(&self) -> &str {
+        &self.leaf.path
+    }
+
+    /// How many numbers it holds.
+    pub(crate) fn len(&self) -> usize {
+        self.leaf.len()
+    }
+
+    /// Whether it is a matrix.
+    pub(crate) fn is_matrix(&self) -> bool {
+        self.leaf.columns > 1
+    }
+
+    /// Puts numbers into the bytes of its buffer.
+    pub(crate) fn write(&self, numbers: &[f64], bytes: &mut [u8]) {
+        self.leaf.write(numbers, bytes);
+    }
+
+    /// The numbers that the bytes of its buffer hold.
+    pub(crate) fn read(&self, bytes: &[u8]) -> Vec<f64> {
+        let places = (0..self.len()).map(|i| {
+            let (column, row) = (i / self.leaf.rows, i % self.leaf.rows);
+            self.leaf.offset as usize + column * self.leaf.stride as usize + row * 4
+        });
+        let words = places.map(|at| {
+            let four = bytes.get(at..at + 4).and_then(|four| four.try_into().ok());
+            f32::from_le_bytes(four.unwrap_or_default())
+        });
+        words.map(f64::from).collect()
+    }
+}
+
 impl Buffer {
     /// A buffer whose parts all are semantics, by the names of its members: that of a supplied vertex stage.
     pub(super) fn of_semantics(module: &Module) -> Option<Self> {
@@ -207,6 +256,26 @@ impl Buffer {
                 *fill = Fill::Dynamic(vec![auto_lod]);
             }
         }
+    }
+
+    /// What may be put into its parts of floats, where they are not always the same.
+    pub(super) fn freedoms(&self) -> impl Iterator<Item = Freedom> + '_ {
+        let parts = self.parts.iter().filter(|(leaf, _)| leaf.is_float());
+        parts.filter_map(|(leaf, fill)| {
+            let (semantic, values, is_any) = match fill {
+                Fill::Semantic(semantic) => (Some(*semantic), Vec::new(), false),
+                Fill::Sampled(values) | Fill::Range(values) => (None, values.clone(), false),
+                Fill::Dynamic(value) => (None, vec![value.clone()], true),
+                Fill::Fixed(_) | Fill::Factor(_) | Fill::PerDraw(_) => return None,
+            };
+            Some(Freedom {
+                leaf: leaf.clone(),
+                at: self.slot(),
+                semantic,
+                values,
+                is_any,
+            })
+        })
     }
 
     /// Its parts, as the rest of the compiler sees them.

@@ -1,0 +1,117 @@
+//! `lodc stability`: where a shader, and the levels of its lock, leave what numbers can hold.
+
+use super::Request;
+use super::search::Ready;
+use crate::emit::Lock;
+use crate::eval::refusal;
+use crate::stability::{Battery, Blamed, Judged, Reach, Verdict};
+use crate::{Diagnostic, Result};
+use lodc_passes::Recipe;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// What is looked at.
+#[derive(Clone, Debug, Default)]
+pub struct StabilityRequest {
+    /// The shader, how it is read, its scene, and where its lock is.
+    pub request: Request,
+    /// A file of inputs to look at, too: what an earlier run wrote.
+    pub replay: Option<PathBuf>,
+    /// A file for the inputs that something fails on.
+    pub record: Option<PathBuf>,
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Stability {
+    /// How the original stands, and those of its inputs that something is wrong with.
+    pub original: Judged,
+    /// The same of each level of the lock, with the autoLOD where it begins.
+    pub levels: Vec<(f32, Judged)>,
+    /// What was found, in the user's source.
+    pub findings: Vec<Box<Diagnostic>>,
+    /// What should be known besides.
+    pub warnings: Vec<Box<Diagnostic>>,
+    /// What is to be written.
+    pub files: super::Files,
+}
+
+impl Stability {
+    /// A line for the original and for each level.
+    pub fn table(&self) -> String {
+        let mut text = format!("  {:<16}{}\n", "original", self.original.says());
+        for (autolod, judged) in &self.levels {
+            let title = format!("autoLOD {autolod}");
+            let _ = writeln!(text, "  {title:<16}{}", judged.says());
+        }
+        text
+    }
+
+    /// Whether a level fails where the original holds.
+    pub fn fails(&self) -> bool {
+        let mut levels = self.levels.iter();
+        levels.any(|(_, judged)| judged.verdict == Verdict::Unstable)
+    }
+}
+
+/// Looks for inputs on which a shader, or a level of the lock beside it, is not finite.
+///
+/// # Errors
+/// As [`super::compile`]; when the lock is there and stale; when the file of inputs cannot be read.
+pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
+    let request = &asked.request;
+    let ready = Ready::read(request)?;
+    let vertex = ready.vertex()?;
+    ready.ends(&vertex)?;
+    let stand = ready.stand(&vertex);
+    let refused = |refused| refusal(&refused, &ready.source);
+    let mut battery = Battery::new(&stand).map_err(refused)?;
+    if let Some(path) = &asked.replay {
+        battery.replay(&crate::front::read_text(path, "file of inputs")?, path)?;
+    }
+    let original = battery.original_alone();
+    let lint = battery.lint();
+    let diagnostic = |blamed: &Blamed| blamed.diagnostic(&ready.base, &ready.source);
+    let mut findings: Vec<Box<Diagnostic>> = lint.iter().map(|(b, _)| diagnostic(b)).collect();
+    let mut worst: Vec<_> = lint.into_iter().map(|(_, failure)| failure).collect();
+    let mut levels = Vec::new();
+    if request.lock().is_file() {
+        let (lock, text) = Lock::read(&request.lock())?;
+        let name = request.lock().display().to_string();
+        let shaders = lock.replay(&ready.base, &name, &text)?;
+        for (level, emitted) in lock.levels.iter().zip(&shaders) {
+            let mut judged = battery.judge(&emitted.shader).map_err(refused)?;
+            if judged.failures.is_empty() {
+                battery
+                    .hunt_into(&emitted.shader, &mut judged)
+                    .map_err(refused)?;
+            }
+            let steps = lock.exact.0.iter().chain(&level.recipe.0);
+            let whole = Recipe(steps.cloned().collect());
+            if let Some(failure) = judged.failures.first() {
+                let blamed = battery.blame((&ready.base, &whole), failure);
+                findings.push(diagnostic(&blamed));
+                worst.push(failure.clone());
+            }
+            levels.push((level.autolod, judged));
+        }
+    }
+    let mut files = super::Files::new();
+    if let Some(path) = &asked.record {
+        files.push((path.clone(), battery.recorded(&worst).into_bytes()));
+    }
+    Ok(Stability {
+        original,
+        levels,
+        findings,
+        warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),
+        files,
+    })
+}
+
+impl Reach {
+    /// Whether pictures of the scene show it.
+    pub fn is_seen(self) -> bool {
+        self == Self::Reachable
+    }
+}

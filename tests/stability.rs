@@ -1,0 +1,235 @@
+//! Traps and innocents: what a simplification breaks beyond the pictures is found, with its line, and what it does not is not.
+//!
+//! A file of `testdata/stability` is a shader whose second line says what is done to it, `// trap: pass path choice` or
+//! `// innocent: ...`, a step after the other with ` then ` between them. What is said of a trap is beside it, `.says`.
+#![cfg(feature = "search")]
+
+mod fixtures;
+
+use fixtures::Goldens;
+use lodc::compile::{self, Compiled, Request, StabilityRequest, normal_form};
+use lodc::eval::program::Program;
+use lodc::front::Source;
+use lodc::scene::Scene;
+use lodc::search::{SampleSet, Samples, Stand};
+use lodc::stability::{Battery, Verdict};
+use lodc_passes::{Recipe, Stage, all_passes, recipe};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What is done to a shader, by its second line.
+struct Case {
+    is_trap: bool,
+    steps: Vec<String>,
+}
+
+fn case(text: &str) -> Case {
+    let line = text.lines().nth(1).unwrap_or_default();
+    let (kind, steps) = line.split_once(": ").expect("it says what is done");
+    Case {
+        is_trap: match kind {
+            "// trap" => true,
+            "// innocent" => false,
+            other => panic!("{other}"),
+        },
+        steps: steps.split(" then ").map(str::to_owned).collect(),
+    }
+}
+
+/// How the shader of a file stands after its steps, and what is said of it.
+fn judged(path: &Path) -> Result<(bool, Verdict, String), String> {
+    let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
+    let scene_file = path.with_extension("toml");
+    let scene = Scene::read(&source, Some(&*scene_file).filter(|file| file.is_file()));
+    let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).expect("it is small");
+    let vertex = match (&scene.vertex_stage, base.index(Stage::Vertex)) {
+        (Some(stage), _) => Program::compile(&stage.module, 0, &[]),
+        (None, index) => Program::compile(base.module(), index.expect("it has one"), &[]),
+    };
+    let vertex = vertex.expect("it runs");
+    let stand = Stand {
+        base: &base,
+        vertex: &vertex,
+        scene: &scene,
+    };
+    let set = SampleSet::new(&stand, scene.nearest, Samples::Search).expect("it runs");
+    let case = case(&source.text);
+    let mut made = base.clone();
+    let mut steps = Vec::new();
+    for wanted in &case.steps {
+        let facts = set.facts(&made);
+        let offered: Vec<_> = all_passes()
+            .flat_map(|pass| pass.candidates(&made, &facts))
+            .collect();
+        let step = offered
+            .iter()
+            .find(|candidate| candidate.to_string().starts_with(wanted));
+        let Some(step) = step else {
+            let all: Vec<String> = offered.iter().map(ToString::to_string).collect();
+            return Err(format!("`{wanted}` is none of\n{}", all.join("\n")));
+        };
+        made = recipe::apply(&made, step).expect("it was offered");
+        steps.push(step.clone());
+    }
+    let battery = Battery::new(&stand).expect("it runs");
+    let mut judged = battery.judge(&made).expect("it runs");
+    if judged.failures.is_empty() {
+        battery.hunt_into(&made, &mut judged).expect("it runs");
+    }
+    let says = judged.failures.first().map(|failure| {
+        let blamed = battery.blame((&base, &Recipe(steps)), failure);
+        format!(
+            "{}\n{}",
+            blamed.says(&base, &source),
+            blamed.diagnostic(&base, &source).render(false)
+        )
+    });
+    Ok((case.is_trap, judged.verdict, says.unwrap_or_default()))
+}
+
+#[test]
+fn traps_are_found_with_their_lines_and_innocents_are_not_flagged() {
+    let mut goldens = Goldens::of("stability");
+    let mut counts = [0, 0];
+    for path in fixtures::shaders("testdata/stability") {
+        let path = path
+            .strip_prefix(env!("CARGO_MANIFEST_DIR"))
+            .expect("it is there");
+        let name = path.display();
+        let (is_trap, verdict, says) = match judged(path) {
+            Ok(judged) => judged,
+            Err(wrong) => {
+                goldens.wrong(format!("{name}: {wrong}"));
+                continue;
+            }
+        };
+        counts[usize::from(!is_trap)] += 1;
+        match (is_trap, verdict) {
+            (true, Verdict::Unstable) => {
+                let file = path.with_extension("says");
+                goldens.compare(&name.to_string(), &file, &says);
+            }
+            (true, _) => goldens.wrong(format!("{name} is not found")),
+            (false, Verdict::Unstable) => goldens.wrong(format!("{name} is flagged:\n{says}")),
+            (false, _) => {}
+        }
+    }
+    goldens.finish();
+    assert!(counts[0] >= 12 && counts[1] >= 12, "{counts:?}");
+}
+
+/// A trap in a folder of its own, with a scene that is quick to search.
+fn small(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("stability")
+        .join(name);
+    fs::create_dir_all(&folder).expect("the folder can be written");
+    let from = Path::new("testdata/stability").join(name);
+    let to = folder.join("trap.wgsl");
+    fs::copy(from.with_extension("wgsl"), &to).expect("it can be copied");
+    let scene = fs::read_to_string(from.with_extension("toml")).unwrap_or_default();
+    let quick = "resolution = [48, 48]\nlevels = 3\noffsets = 1\ne_max = 0.2\n";
+    fs::write(to.with_extension("toml"), format!("{quick}{scene}")).expect("it can be written");
+    to
+}
+
+fn compiled(shader: &Path, unstable: bool) -> Compiled {
+    let request = Request {
+        shader: shader.to_owned(),
+        unstable,
+        ..Request::default()
+    };
+    compile::compile(&request, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Guards that no picture needs are all that can be saved within a small bound.
+#[test]
+fn the_search_avoids_what_it_would_choose_otherwise() {
+    let shader = small("normalize_of_what_can_vanish");
+    let text = fs::read_to_string(&shader).expect("it was written");
+    let (head, _) = text
+        .split_once("@fragment")
+        .expect("it has a fragment stage");
+    let body = "@fragment
+fn fs_main(in: Varyings) -> @location(0) vec4f {
+    let left = 1.0 - 0.3 * in.world_normal;
+    let low = max(left, vec3f(0.001));
+    let high = min(low, vec3f(3.0));
+    let up = sqrt(high);
+    return vec4f(0.3 * up, 1.0);
+}
+";
+    let shader = shader.with_file_name("guarded.wgsl");
+    fs::write(&shader, format!("{head}{body}")).expect("it can be written");
+    let scene = "resolution = [48, 48]\nlevels = 3\noffsets = 1\ne_max = 0.0001\n";
+    fs::write(shader.with_extension("toml"), scene).expect("it can be written");
+    let verdicts = |compiled: &Compiled| -> Vec<String> {
+        let levels = compiled.report.levels.iter();
+        let verdicts = levels.map(|level| level.stability.verdict.clone());
+        verdicts.map(Option::unwrap_or_default).collect()
+    };
+    let allowed = compiled(&shader, true);
+    let verdicts_of_allowed = verdicts(&allowed);
+    assert!(
+        verdicts_of_allowed.contains(&"unstable".to_owned()),
+        "{verdicts_of_allowed:?}"
+    );
+    let mut notes = allowed.warnings.iter().flat_map(|warning| &warning.notes);
+    assert!(notes.any(|note| note.contains("UNSTABLE")));
+    let held = compiled(&shader, false);
+    let verdicts = verdicts(&held);
+    assert!(
+        verdicts.iter().all(|verdict| verdict == "stable"),
+        "{verdicts:?}"
+    );
+}
+
+#[test]
+fn the_worst_inputs_are_written_and_looked_at_again() {
+    let shader = small("normalize_of_what_can_vanish");
+    let text = fs::read_to_string(&shader).expect("it was written");
+    // Without its guard.
+    let bare = text.replace("max(square, 0.00000001)", "square");
+    fs::write(&shader, bare).expect("it can be written");
+    let worst = shader.with_extension("inputs.json");
+    let looked = |replay: Option<PathBuf>| {
+        let asked = StabilityRequest {
+            request: Request {
+                shader: shader.clone(),
+                ..Request::default()
+            },
+            replay,
+            record: Some(worst.clone()),
+        };
+        compile::stability(&asked).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let first = looked(None);
+    assert!(first.original.of_original > 0 && !first.findings.is_empty());
+    let (path, recorded) = &first.files[0];
+    fs::write(path, recorded).expect("it can be written");
+    let again = looked(Some(worst.clone()));
+    assert!(again.original.of_original > first.original.of_original);
+
+    // With the guard it holds all of that.
+    fs::write(&shader, text).expect("it can be written");
+    let held = looked(Some(worst.clone()));
+    assert_eq!(
+        (held.original.verdict, held.findings.len()),
+        (Verdict::Stable, 0)
+    );
+    fs::write(&worst, "[").expect("it can be written");
+    let asked = StabilityRequest {
+        request: Request {
+            shader: shader.clone(),
+            ..Request::default()
+        },
+        replay: Some(worst),
+        record: None,
+    };
+    let error = compile::stability(&asked).expect_err("it is no file of inputs");
+    assert!(
+        error.message.contains("no file of recorded inputs"),
+        "{error}"
+    );
+}
