@@ -21,6 +21,8 @@ mod mesh;
 mod model_file;
 #[cfg(feature = "search")]
 mod search;
+#[cfg(feature = "mesh")]
+mod seen_mesh;
 mod snapshot;
 #[cfg(feature = "search")]
 mod stability;
@@ -46,6 +48,10 @@ pub use mesh::{
 pub use model_file::ModelFile;
 #[cfg(feature = "search")]
 pub use search::{Compiled, compile, inspect, trajectory};
+#[cfg(feature = "mesh")]
+pub use seen_mesh::{
+    PictureGoals, PictureLevel, PictureRequest, Seeing, SeenMesh, mesh_by_pictures,
+};
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
 #[cfg(feature = "search")]
 pub use stability::{Stability, StabilityRequest, stability};

@@ -201,6 +201,13 @@ struct ShaderArgs {
     /// The material shader: WGSL, or a GLSL fragment shader
     #[arg(required = true)]
     shader: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
+}
+
+/// How a shader is read.
+#[derive(Debug, Args)]
+struct ReadingArgs {
     /// The vertex entry point, where there are several
     #[arg(long, value_name = "NAME")]
     vertex: Option<String>,
@@ -494,22 +501,31 @@ impl InputArgs {
 
 impl ShaderArgs {
     fn request(self) -> Result<Request> {
-        let definitions = self.definitions.iter();
-        let definitions = definitions.map(|text| Definition::of_text(text));
+        let (stages, modules) = self.reading.read()?;
         Ok(Request {
-            modules: Modules {
-                folders: self.folders,
-                definitions: definitions.collect::<Result<_>>()?,
-            },
+            modules,
             // The parser has asked for it.
             shader: self.shader.unwrap_or_default(),
-            stages: Stages {
-                vertex: self.vertex,
-                fragment: self.fragment,
-                vertex_file: self.vertex_file,
-            },
+            stages,
             ..Request::default()
         })
+    }
+}
+
+impl ReadingArgs {
+    fn read(self) -> Result<(Stages, Modules)> {
+        let definitions = self.definitions.iter();
+        let definitions = definitions.map(|text| Definition::of_text(text));
+        let modules = Modules {
+            folders: self.folders,
+            definitions: definitions.collect::<Result<_>>()?,
+        };
+        let stages = Stages {
+            vertex: self.vertex,
+            fragment: self.fragment,
+            vertex_file: self.vertex_file,
+        };
+        Ok((stages, modules))
     }
 }
 

@@ -118,17 +118,7 @@ pub struct Simplifying {
 /// # Errors
 /// When the model cannot be read or is damaged; when the output cannot be written, or is the model itself.
 pub fn mesh(request: &MeshRequest, progress: &dyn Fn(Simplifying)) -> Result<SimplifiedMesh> {
-    if let Some(output) = &request.output {
-        // What cannot be written should be known before the work.
-        emit::writable(&[(output.clone(), Vec::new())])?;
-        if same_file(output, &request.model) {
-            return Err(Diagnostic::error(format!(
-                "the output `{}` is the model itself",
-                output.display()
-            ))
-            .with_note("give another name with `-o`"));
-        }
-    }
+    check_output(request.output.as_deref(), &request.model)?;
     let model = ModelFile::read(&request.model)?;
     let original = &model.mesh;
     let reference = Reference::new(original);
@@ -161,14 +151,14 @@ pub fn mesh(request: &MeshRequest, progress: &dyn Fn(Simplifying)) -> Result<Sim
         }
         let made = simplifier.mesh();
         let time = began.elapsed();
-        // A unit at distance 1 is so many pixels high.
-        let pixels = f64::from(request.height) * request.sight.height(1.0, 1.0);
+        let distance = reference.to(&made);
+        let seen = (&request.sight, request.height);
         levels.push(MeshLevel {
             triangles: made.indices.len() / 3,
             vertices: made.positions.len(),
-            distance: reference.to(&made),
             bound: simplifier.bound(),
-            from: request.sight.scale * (0.5 * size + simplifier.bound() * pixels),
+            from: from_distance(&distance, simplifier.bound(), seen),
+            distance,
             time,
         });
         meshes.push(made);
@@ -191,6 +181,30 @@ pub fn mesh(request: &MeshRequest, progress: &dyn Fn(Simplifying)) -> Result<Sim
         levels,
         warnings: model.warnings,
     })
+}
+
+/// Refuses what cannot be written before the work is done, and to write over the model.
+pub(super) fn check_output(output: Option<&Path>, model: &Path) -> Result<()> {
+    let Some(output) = output else {
+        return Ok(());
+    };
+    emit::writable(&[(output.to_owned(), Vec::new())])?;
+    if same_file(output, model) {
+        return Err(Diagnostic::error(format!(
+            "the output `{}` is the model itself",
+            output.display()
+        ))
+        .with_note("give another name with `-o`"));
+    }
+    Ok(())
+}
+
+/// From where on a level is drawn: there what it is off is a pixel high at the nearest point of the sphere about its box. From the
+/// eye to the sphere's centre, world units.
+pub(super) fn from_distance(distance: &Distance, off: f64, (sight, height): (&Sight, u32)) -> f64 {
+    // A unit at distance 1 is so many pixels high.
+    let pixels = f64::from(height) * sight.height(1.0, 1.0);
+    sight.scale * (0.5 * distance.diagonal + off * pixels)
 }
 
 /// How far one level goes, in the model's units.

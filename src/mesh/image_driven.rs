@@ -7,9 +7,14 @@
 //! 1. the cheapest edges by the guess, [`Settings::share`] of them; of these a set that does not meet: no two share a triangle,
 //!    and no two may change the same square of 2 x 2 pixels in any view;
 //! 2. all of the set drawn at once, moved to the one end, and again to the other: only the squares that they may change.
-//!    Since none meets another, each one's error is the difference within its own squares, exactly;
+//!    Since none meets another, what each one changes is the difference within its own squares, exactly. Samples are few, and the
+//!    guess is worth some more of them; what outlines move is the guess's alone, since whether one moves over a sample is chance;
 //! 3. those whose better end costs least go, up to [`Settings::accepted`] of the set and never beyond the bound. The guess at the
 //!    others becomes what was measured, and the guess at what is around those that went is corrected by it.
+//!
+//! Edges of triangles so small that all views together hardly sample them go by the guess, many at once, and what comes of them is
+//! seen together. Meshes are compared with the original's picture with the same samples, which aliases alike: by the reference
+//! those edges would seem best that happen to undo an error of the original's.
 //!
 //! What is hidden in all views behind what is seen costs nothing and goes by the guess alone. Squares are drawn with every
 //! triangle that reaches them, so that a surface comes out that was hidden behind a silhouette, and derivatives see whole quads.
@@ -31,6 +36,7 @@ use rayon::prelude::*;
 
 /// What refuses an edge whatever the picture says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum EdgeRule {
     /// Points of the original that went would be farther from the surface than allowed.
     #[default]
@@ -93,8 +99,17 @@ const CHUNK: usize = 256;
 /// By how much a guess is corrected at most by one measurement.
 const MOST_CORRECTION: f64 = 16.0;
 
-/// How much what an edge changes in the picture is its score, and how much what it adds to the error.
-const CHANGE: f64 = 1.0;
+/// Edges of which all views together take fewer samples are not judged by them.
+const FEWEST_SAMPLES: f64 = 16.0;
+
+/// How many samples a guess is worth.
+const WORTH_OF_GUESS: f64 = 64.0;
+
+/// How much of what the bound leaves a round may use up by guesses alone.
+const SHARE_OF_ROOM: f64 = 0.25;
+
+/// How much of what was learnt of guesses is kept from one time to the next.
+const KEPT_OF_SCALE: f64 = 0.8;
 
 /// The pictures are drawn whole again whenever so much of the triangles has gone.
 const CHECK_EVERY: f64 = 0.1;
@@ -113,16 +128,37 @@ struct Tried {
     ends: Vec<Collapse>,
     /// The part of each view that it may change.
     parts: Vec<Option<Part>>,
+    /// How many samples all views take of what may change, on average.
+    samples: f64,
+    /// What it is guessed to change.
     guess: f64,
+    /// What of that outlines are, which pictures do not tell.
+    outline: f64,
 }
 
-/// What came of it: the end that is better, and what that adds to the sum of squared changes.
+/// What came of it, at the end that is better.
 struct Scored {
     tried: usize,
     end: usize,
+    /// What it is taken to add to the sum of squared changes.
     added: f64,
+    /// What it adds to that in the pictures.
+    change: f64,
     /// What it adds to the sum of squared errors.
     error: f64,
+}
+
+impl Scored {
+    /// Of an edge that was not drawn by itself.
+    fn unseen() -> Self {
+        Self {
+            tried: 0,
+            end: 0,
+            added: 0.0,
+            change: 0.0,
+            error: 0.0,
+        }
+    }
 }
 
 /// What is known at one distance.
@@ -138,8 +174,12 @@ struct Round<'a, 's> {
     stale: Vec<bool>,
     /// What guesses at each point are multiplied by.
     factors: Vec<f64>,
+    /// Sums of what edges changed, and of what was guessed, the latest of them most.
+    scale: [f64; 2],
     /// The sum of errors.
     error: f64,
+    /// The sum of changes.
+    change: f64,
     steps: Vec<Step>,
     coverage: f64,
 }
@@ -204,7 +244,9 @@ impl<'a> Simplifier<'a> {
             best: vec![None; points],
             stale: vec![true; points],
             factors: vec![1.0; points],
+            scale: [0.0; 2],
             error: 0.0,
+            change: 0.0,
             steps: Vec::new(),
             coverage,
         };
@@ -231,14 +273,26 @@ impl<'a> Simplifier<'a> {
                 excess: (round.error / coverage - floor).max(0.0).sqrt(),
             });
         }
-        Sequence {
+        let mut sequence = Sequence {
             distance,
             floor,
             start,
             triangles: left,
             square,
             steps: round.steps,
-        }
+        };
+        // Guesses may have gone too far.
+        let is_over = |step: &Step| step.square * coverage > most_error;
+        let over = sequence
+            .steps
+            .iter()
+            .rev()
+            .take_while(|step| is_over(step))
+            .count();
+        let within = sequence.steps.len() - over;
+        self.go_back(&sequence, within);
+        sequence.steps.truncate(within);
+        sequence
     }
 
     /// Whether the rule allows an edge to go.
@@ -277,6 +331,7 @@ impl Round<'_, '_> {
             view.show(picture);
         });
         self.error = self.views.iter().map(|view| view.picture().error()).sum();
+        self.change = self.views.iter().map(|view| view.picture().change()).sum();
     }
 
     /// Finds the best edge of each point where that may have changed.
@@ -286,7 +341,8 @@ impl Round<'_, '_> {
             let edges = surface.neighbours(point).into_iter();
             let costs = edges.filter_map(|to| {
                 let collapse = surface.collapse(point, to).ok()?;
-                Some((quadrics.cost(surface, &collapse), to))
+                let cost = quadrics.cost(surface, &collapse);
+                Some((cost + quadrics.outline_cost(surface, &collapse), to))
             });
             costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
         };
@@ -308,21 +364,34 @@ impl Round<'_, '_> {
         });
         let mut order: Vec<(f64, u32, u32)> = guesses.collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let set = self.choose(&order, fewest);
+        let (small, set) = self.choose(&order, fewest, most_error);
+        let mut has_gone = !small.is_empty();
+        self.take_small(&small);
         if set.is_empty() {
-            return false;
+            return has_gone;
         }
         let pictures = self.try_both_ends(&set);
         let mut scored = self.score(&set, &pictures);
+        self.learn(scored.iter().map(|one| {
+            let tried = &set[one.tried];
+            (one.added, tried.guess - tried.outline)
+        }));
+        let scale = self.scale();
+        for one in &mut scored {
+            // A few samples say little: the guess is worth so many.
+            let tried = &set[one.tried];
+            let share = WORTH_OF_GUESS / (WORTH_OF_GUESS + tried.samples);
+            one.added += share * (scale * (tried.guess - tried.outline) - one.added);
+            one.added += scale * tried.outline;
+        }
         scored.sort_unstable_by(|a, b| a.added.total_cmp(&b.added).then(a.tried.cmp(&b.tried)));
         let accepted = ((scored.len() as f64 * self.simplifier.settings.accepted).ceil()) as usize;
-        let mut has_gone = false;
         for (place, one) in scored.iter().enumerate() {
             let tried = &set[one.tried];
             let from = tried.ends[0].from as usize;
             let fits = self.error + one.error <= most_error;
             let left = self.simplifier.surface.triangle_count();
-            if left > fewest && fits && (place < accepted || one.added <= 0.0) {
+            if left > fewest && fits && place < accepted {
                 self.take(tried, one, &pictures[one.end]);
                 has_gone = true;
                 continue;
@@ -331,9 +400,11 @@ impl Round<'_, '_> {
             // changes around it.
             match self.best[from] {
                 Some((cost, _)) if fits && cost > 0.0 => {
-                    self.factors[from] = one.added.max(0.0) / cost;
+                    self.factors[from] = one.added.max(0.0) / (cost * scale);
                 }
-                Some((_, to)) if fits => self.best[from] = Some((one.added.max(0.0), to)),
+                Some((_, to)) if fits => {
+                    self.best[from] = Some((one.added.max(0.0) / scale, to));
+                }
                 _ => self.best[from] = None,
             }
         }
@@ -341,18 +412,27 @@ impl Round<'_, '_> {
         has_gone || order.len() > set.len()
     }
 
-    /// A set of edges that do not meet, of the cheapest.
-    fn choose(&mut self, order: &[(f64, u32, u32)], fewest: usize) -> Vec<Tried> {
+    /// Edges of the cheapest that do not meet: those that are too small for the pictures to judge them singly, and those whose
+    /// squares do not meet either.
+    fn choose(
+        &mut self,
+        order: &[(f64, u32, u32)],
+        fewest: usize,
+        most_error: f64,
+    ) -> (Vec<Tried>, Vec<Tried>) {
         let share = (order.len() as f64 * self.simplifier.settings.share).ceil() as usize;
         let most = share.max(LEAST_OF_ROUND);
         // Each edge takes a triangle or two.
         let left = self.simplifier.surface.triangle_count();
         let room = left.saturating_sub(fewest).div_ceil(2).max(1);
-        let mut set: Vec<Tried> = Vec::new();
+        let (mut small, mut set): (Vec<Tried>, Vec<Tried>) = (Vec::new(), Vec::new());
+        let mut guessed = 0.0;
+        let most_guessed = SHARE_OF_ROOM * (most_error - self.error) / self.scale();
         let mut claimed: Vec<_> = self.views.iter().map(|v| v.squares(false)).collect();
         let mut taken = vec![false; self.best.len()];
         for (number, chunk) in order.chunks(CHUNK).enumerate() {
-            if number * CHUNK >= most && !set.is_empty() || set.len() >= room {
+            let count = small.len() + set.len();
+            if number * CHUNK >= most && count > 0 || count >= room {
                 break;
             }
             let tried: Vec<_> = chunk
@@ -364,7 +444,7 @@ impl Round<'_, '_> {
                     self.best[*from as usize] = None;
                     continue;
                 };
-                if set.len() >= room {
+                if small.len() + set.len() >= room {
                     break;
                 }
                 let surface = &self.simplifier.surface;
@@ -372,23 +452,77 @@ impl Round<'_, '_> {
                 if around.iter().flatten().any(|point| taken[*point as usize]) {
                     continue;
                 }
-                let parts = || claimed.iter().zip(&tried.parts);
-                if parts()
-                    .any(|(claimed, part)| part.as_ref().is_some_and(|part| claimed.any(&part.0)))
-                {
-                    continue;
-                }
-                for (claimed, part) in claimed.iter_mut().zip(&tried.parts) {
-                    if let Some(part) = part {
-                        claimed.mark(&part.0);
+                let is_small = tried.samples < FEWEST_SAMPLES;
+                if is_small {
+                    if guessed + tried.guess > most_guessed {
+                        continue;
+                    }
+                    guessed += tried.guess;
+                } else {
+                    let mut parts = claimed.iter().zip(&tried.parts);
+                    if parts.any(|(claimed, part)| {
+                        part.as_ref().is_some_and(|part| claimed.any(&part.0))
+                    }) {
+                        continue;
+                    }
+                    for (claimed, part) in claimed.iter_mut().zip(&tried.parts) {
+                        if let Some(part) = part {
+                            claimed.mark(&part.0);
+                        }
                     }
                 }
                 taken[*from as usize] = true;
                 taken[*to as usize] = true;
-                set.push(tried);
+                match is_small {
+                    true => small.push(tried),
+                    false => set.push(tried),
+                }
             }
         }
-        set
+        (small, set)
+    }
+
+    /// What guesses are to be multiplied by.
+    fn scale(&self) -> f64 {
+        let [measured, guessed] = self.scale;
+        let scale = measured / guessed;
+        if scale.is_finite() && scale > 0.0 {
+            scale
+        } else {
+            1.0
+        }
+    }
+
+    /// Takes note of what was measured, and of what was guessed of that.
+    fn learn(&mut self, pairs: impl Iterator<Item = (f64, f64)>) {
+        let mut sums = [0.0; 2];
+        for (measured, guessed) in pairs {
+            sums[0] += measured;
+            sums[1] += guessed;
+        }
+        for (kept, new) in self.scale.iter_mut().zip(sums) {
+            *kept = KEPT_OF_SCALE * *kept + new;
+        }
+    }
+
+    /// Lets small edges go by the guess, and draws what came of all together.
+    fn take_small(&mut self, small: &[Tried]) {
+        if small.is_empty() {
+            return;
+        }
+        let (first, error, change) = (self.steps.len(), self.error, self.change);
+        for tried in small {
+            self.take(tried, &Scored::unseen(), &[]);
+        }
+        self.look_at_all();
+        let guessed: f64 = small.iter().map(|t| t.guess - t.outline).sum();
+        self.learn([((self.change - change).max(0.0), guessed)].into_iter());
+        // What came of each alone is not known.
+        let count = small.len() as f64;
+        for (place, step) in (1..).zip(&mut self.steps[first..]) {
+            let share = f64::from(place) / count;
+            step.square = (error + share * (self.error - error)) / self.coverage;
+        }
     }
 
     /// An edge with what it may change; none that may not go.
@@ -402,28 +536,46 @@ impl Round<'_, '_> {
         let first = allowed(from, to)?;
         let mut ends = vec![first];
         ends.extend(allowed(to, from));
-        let parts = self.views.iter().map(|view| self.part(view, &ends));
+        let mut samples = 0.0;
+        let mut parts = Vec::with_capacity(self.views.len());
+        for view in &self.views {
+            let part = self.part(view, &ends)?;
+            samples += part.as_ref().map_or(0.0, |(_, area)| *area);
+            parts.push(part.map(|(part, _)| part));
+        }
+        let outline = self.quadrics.outline_cost(surface, &ends[0]);
         Some(Tried {
-            parts: parts.collect::<Option<_>>()?,
+            outline: (outline * self.factors[from as usize]).min(guess),
+            parts,
             ends,
+            samples,
             guess,
         })
     }
 
-    /// The part of a view that an edge may change; inner none where it changes nothing, outer none where it cannot be told.
-    fn part(&self, view: &View, ends: &[Collapse]) -> Option<Option<Part>> {
+    /// The part of a view that an edge may change, and how many pixels its triangles have there; inner none where it changes
+    /// nothing, outer none where it cannot be told.
+    fn part(&self, view: &View, ends: &[Collapse]) -> Option<Option<(Part, f64)>> {
+        let surface = &self.simplifier.surface;
         let spots = view.retained().spots();
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         let mut nearest = f32::INFINITY;
-        for collapse in ends {
-            for triangle in self.simplifier.surface.around(collapse.from) {
-                for vertex in self.simplifier.surface.triangle(*triangle)? {
+        let mut area = 0.0;
+        for (end, collapse) in ends.iter().enumerate() {
+            for triangle in surface.around(collapse.from) {
+                let mut at = [[0.0; 2]; 3];
+                for (at, vertex) in at.iter_mut().zip(surface.triangle(*triangle)?) {
                     let spot = (*spots.get(vertex as usize)?)?;
                     nearest = nearest.min(spot.depth);
+                    *at = spot.at;
                     for i in [0, 1] {
                         low[i] = low[i].min(spot.at[i]);
                         high[i] = high[i].max(spot.at[i]);
                     }
+                }
+                if end == 0 {
+                    let [[ax, ay], [bx, by], [cx, cy]] = at;
+                    area += ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)).abs() / 2.0;
                 }
             }
         }
@@ -432,7 +584,7 @@ impl Round<'_, '_> {
             return Some(None);
         };
         let is_hidden = nearest > view.picture().farthest(&part, view.size());
-        Some((!is_hidden).then_some(part))
+        Some((!is_hidden).then_some((part, f64::from(area))))
     }
 
     /// The pictures with all edges of a set moved to the one end, and to the other, where that is allowed.
@@ -480,7 +632,7 @@ impl Round<'_, '_> {
                         error += picture.error_of(part, size) - before.error_of(part, size);
                     }
                 }
-                (CHANGE * change + (1.0 - CHANGE) * error, error, end)
+                (change, error, end)
             });
             // Of equal ones the first, which the guess prefers.
             let best = added.min_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
@@ -489,6 +641,7 @@ impl Round<'_, '_> {
                 tried: number,
                 end,
                 added,
+                change: added,
                 error,
             }
         };
@@ -505,10 +658,12 @@ impl Round<'_, '_> {
             }
         }
         put(&mut self.triangles, collapse);
+        let scale = self.scale();
         let simplifier = &mut *self.simplifier;
         simplifier.surface.apply(collapse);
         self.quadrics.apply(collapse);
         self.error += one.error;
+        self.change += one.change;
         self.steps.push(Step {
             collapse: collapse.clone(),
             square: self.error / self.coverage,
@@ -520,7 +675,8 @@ impl Round<'_, '_> {
         self.best[from] = None;
         // The guess was as wrong as this around here.
         if one.end == 0 && tried.guess > 0.0 && one.added > 0.0 {
-            let ratio = (one.added / tried.guess).clamp(1.0 / MOST_CORRECTION, MOST_CORRECTION);
+            let ratio =
+                (one.added / (tried.guess * scale)).clamp(1.0 / MOST_CORRECTION, MOST_CORRECTION);
             self.factors[to] = (self.factors[to] * self.factors[from] * ratio).sqrt();
         }
         self.stale[to] = true;

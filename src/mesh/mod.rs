@@ -23,7 +23,7 @@ mod selection;
 mod view;
 
 pub use image_driven::{EdgeRule, Settings, Simplifier, Until, Watch};
-pub use levels::{Maker, MeshLevel, Other, Wanted, levels};
+pub use levels::{LevelMesh, Levels, Maker, Other, Wanted};
 pub use pictures::{Pictures, Triangles};
 pub use selection::{Sequence, Step};
 

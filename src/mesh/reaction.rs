@@ -5,7 +5,7 @@
 //! a meaning. A pixel's squared difference is its triangle's. In sums over the triangles around a point this is what the
 //! derivative of the error is: a dense mesh has less than a pixel for each triangle, so that single ones would say little.
 
-use super::view::Drawn;
+use super::view::{Drawn, LARGEST_CHANGE};
 use super::{Pictures, Triangles};
 use crate::eval::raster::{Attribute, Frame, Retained};
 use crate::scene::mesh::Mesh;
@@ -20,8 +20,22 @@ const STEP: f64 = 0.5;
 /// How much a normal or a colour is changed for that.
 const SMALL: f64 = 0.02;
 
-/// What a triangle that no view sees weighs, as a share of the mean by area.
+/// What a triangle that no view sees weighs, as a share of the mean by area of those that are seen.
 const UNSEEN: f64 = 1e-4;
+
+/// How much of what a triangle weighs is that mean, where it is seen: views are few.
+const COMMON: f64 = 0.25;
+
+/// A triangle with less of its share of pixels than this is seen from few sides.
+const SEEN: f64 = 0.1;
+
+/// How many sums there are for a triangle: what the position weighs, what each channel does, what outlines do, and how many pixels
+/// show it.
+const SUMS: usize = CHANNELS + 3;
+
+/// The last two of them.
+const OUTLINE: usize = CHANNELS + 1;
+const PIXELS: usize = CHANNELS + 2;
 
 /// What is changed, and by how much.
 #[derive(Clone, Copy)]
@@ -46,14 +60,15 @@ pub(super) fn weights(
     let mesh = &first.frame().mesh;
     let changes = changes(first.frame(), (surface, triangles), pixels_per_unit);
     let of_views = views.par_iter().map(|view| {
-        let mut weights = vec![Weights::default(); triangles.0.len()];
+        let mut sums = vec![[0.0; SUMS]; triangles.0.len()];
         let squares = view.squares(true);
-        let plain = view.draw(
-            subject,
-            (view.retained(), view.frame()),
-            triangles,
-            &squares,
-        );
+        let of_view = (view.retained(), view.frame());
+        let plain = view.draw(subject, of_view, triangles, &squares);
+        let draws = mesh.draws();
+        let of = |(draw, number): (usize, u32)| draws[draw].triangles.start + number as usize;
+        for (_, _, triangle) in plain.coverage.triangles() {
+            sums[of(triangle)][PIXELS] += 1.0;
+        }
         for change in &changes {
             let frame = Frame {
                 mesh: Arc::new(changed(mesh, *change)),
@@ -61,24 +76,17 @@ pub(super) fn weights(
             };
             let retained = Retained::new(subject.vertex, subject.fragment, &frame);
             let other = view.draw(subject, (&retained, &frame), triangles, &squares);
-            let draws = mesh.draws();
-            let of = |(draw, number): (usize, u32)| draws[draw].triangles.start + number as usize;
-            add(&mut weights, *change, [&plain, &other], of);
+            add(&mut sums, *change, [&plain, &other], of);
         }
-        weights
+        sums
     });
-    let sums = of_views
-        .collect::<Vec<_>>()
-        .into_iter()
-        .reduce(|mut sum, view| {
-            for (to, from) in sum.iter_mut().zip(view) {
-                to.position += from.position;
-                for (to, from) in to.channels.iter_mut().zip(from.channels) {
-                    *to += from;
-                }
-            }
-            sum
-        });
+    let of_views: Vec<Vec<[f64; SUMS]>> = of_views.collect();
+    let sums = of_views.into_iter().reduce(|mut sums, view| {
+        for (to, from) in sums.as_flattened_mut().iter_mut().zip(view.as_flattened()) {
+            *to += from;
+        }
+        sums
+    });
     smooth((surface, triangles), &sums.unwrap_or_default())
 }
 
@@ -150,7 +158,7 @@ fn changed(mesh: &Mesh, change: Change) -> Mesh {
 
 /// Adds what two pictures differ by to the triangles that are seen in them; `of` numbers those.
 fn add(
-    weights: &mut [Weights],
+    sums: &mut [[f64; SUMS]],
     change: Change,
     [plain, other]: [&Drawn; 2],
     of: impl Fn((usize, u32)) -> usize,
@@ -162,7 +170,7 @@ fn add(
         }
     }
     for ((triangle, plain), other) in seen.iter().zip(&plain.shown).zip(&other.shown) {
-        let Some(weights) = triangle.and_then(|triangle| weights.get_mut(triangle)) else {
+        let Some(sums) = triangle.and_then(|triangle| sums.get_mut(triangle)) else {
             continue;
         };
         let each = plain.as_flattened().iter().zip(other.as_flattened());
@@ -172,56 +180,70 @@ fn add(
             .sum::<f64>()
             / 6.0;
         match change {
-            Change::Position(step) => weights.position += square / (step * step),
-            Change::Channel(channel, step) => weights.channels[channel] += square / (step * step),
+            Change::Position(step) => {
+                let shaded = square.min(f64::from(LARGEST_CHANGE));
+                sums[0] += shaded / (step * step);
+                sums[OUTLINE] += (square - shaded) / (step * step);
+            }
+            Change::Channel(channel, step) => sums[channel + 1] += square / (step * step),
         }
     }
 }
 
-/// Spreads weights over the triangles around each point, by area.
-fn smooth((surface, triangles): (&Surface, &Triangles), weights: &[Weights]) -> Vec<Weights> {
+/// Weights from sums, which are spread over the triangles around each point, by area.
+fn smooth((surface, triangles): (&Surface, &Triangles), sums: &[[f64; SUMS]]) -> Vec<Weights> {
     let area = |corners: [u32; 3]| {
         let [a, b, c] = corners.map(|vertex| surface.position(surface.point_of(vertex)));
         DVec3::cross(b - a, c - a).length()
     };
-    let parts = |weights: &Weights| {
-        let mut parts = [weights.position; CHANNELS + 1];
-        parts[1..].copy_from_slice(&weights.channels);
-        parts
-    };
+    let points = |corners: [u32; 3]| corners.map(|vertex| surface.point_of(vertex) as usize);
     let mut areas = vec![0.0; surface.points()];
-    let mut sums = vec![[0.0; CHANNELS + 1]; surface.points()];
-    let (mut whole, mut total) = (0.0, [0.0; CHANNELS + 1]);
-    for (corners, weights) in triangles.0.iter().zip(weights) {
+    let mut around = vec![[0.0; SUMS]; surface.points()];
+    let (mut seen, mut total) = (0.0, [0.0; SUMS]);
+    for (corners, sums) in triangles.0.iter().zip(sums) {
         let Some(corners) = *corners else { continue };
-        let (area, parts) = (area(corners), parts(weights));
-        for point in corners.map(|vertex| surface.point_of(vertex) as usize) {
+        let area = area(corners);
+        for point in points(corners) {
             areas[point] += area;
-            for (to, from) in sums[point].iter_mut().zip(parts) {
+            for (to, from) in around[point].iter_mut().zip(sums) {
                 *to += from;
             }
         }
-        whole += area;
-        for (to, from) in total.iter_mut().zip(parts) {
+        for (to, from) in total.iter_mut().zip(sums) {
             *to += from;
         }
     }
-    let least = total.map(|total| UNSEEN * total / f64::max(whole, f64::MIN_POSITIVE));
+    for (areas, around) in areas.iter().zip(&around) {
+        // Each triangle is around three points.
+        seen += if around[PIXELS] > 0.0 {
+            areas / 3.0
+        } else {
+            0.0
+        };
+    }
+    let mean = total.map(|total| total / f64::max(seen, f64::MIN_POSITIVE));
     let of_triangle = |corners: &Option<[u32; 3]>| {
         let Some(corners) = *corners else {
             return Weights::default();
         };
-        let area = area(corners);
-        let points = corners.map(|vertex| surface.point_of(vertex) as usize);
-        let part = |i: usize| {
-            let density = points.map(|point| match areas[point] > 0.0 {
-                true => sums[point][i] / areas[point],
+        let density = |i: usize| {
+            let density = points(corners).map(|point| match areas[point] > 0.0 {
+                true => around[point][i] / areas[point],
                 false => 0.0,
             });
-            area * (density.iter().sum::<f64>() / 3.0 + least[i])
+            density.iter().sum::<f64>() / 3.0
+        };
+        let is_seen = (density(PIXELS) / (SEEN * mean[PIXELS])).min(1.0);
+        let is_seen = if is_seen.is_nan() { 0.0 } else { is_seen };
+        let part = |i: usize| {
+            let common = COMMON * is_seen;
+            let own = (1.0 - common) * density(i) + common * mean[i];
+            area(corners) * (own + UNSEEN * mean[i])
         };
         Weights {
             position: part(0),
+            // Wherever it is, somebody sees it as an outline.
+            outline: area(corners) * mean[OUTLINE] * (is_seen + UNSEEN),
             channels: std::array::from_fn(|channel| part(channel + 1)),
         }
     };

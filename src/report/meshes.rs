@@ -1,7 +1,8 @@
 //! Levels of a mesh and distances of meshes, as tables and as data.
 
 use super::terminal::columns;
-use crate::compile::{MeshError, MeshLevel};
+use crate::compile::{MeshError, MeshLevel, SeenMesh};
+use crate::mesh::{Maker, Other};
 use lodc_mesh::distance::{Distance, Way};
 use serde_json::{Value, json};
 
@@ -46,6 +47,75 @@ pub fn mesh_levels(levels: &[MeshLevel]) -> String {
     columns(&rows, &[false; 11])
         + "  mean: from the vertices of both to the other, Pan's equation 1; largest: of those; bound: proved, for all points of both surfaces\n  \
            from distance: where the bound is a pixel high\n"
+}
+
+/// The table of a mesh and its levels by pictures, and what other makers do in their place.
+pub fn seen_mesh(made: &SeenMesh) -> String {
+    let head = [
+        "level",
+        "triangles",
+        "",
+        "vertices",
+        "mean of diagonal",
+        "distance",
+        "floor",
+        "excess",
+        "bound",
+        "made by",
+        "made in",
+    ];
+    let mut rows = vec![head.map(str::to_owned)];
+    let [triangles, vertices] = made.original;
+    let mut first: [String; 11] = std::array::from_fn(|_| "-".to_owned());
+    first[..4].clone_from_slice(&[
+        "0".to_owned(),
+        triangles.to_string(),
+        "100.0 %".to_owned(),
+        vertices.to_string(),
+    ]);
+    rows.push(first);
+    let share = |count: usize| 100.0 * count as f64 / triangles.max(1) as f64;
+    let mut others = String::new();
+    for (number, level) in (1..).zip(&made.levels) {
+        let (maker, proposals) = &level.makers;
+        let [own, asked] = level.times.map(|time| time.as_secs_f64());
+        rows.push([
+            number.to_string(),
+            level.triangles.to_string(),
+            format!("{:.1} %", share(level.triangles)),
+            level.vertices.to_string(),
+            percent(level.distance.mean(), level.distance.diagonal),
+            format!("{:.2}", level.at),
+            format!("{:.4}", level.floor),
+            format!("{:.4}", level.excess),
+            level
+                .bound
+                .map_or("-".to_owned(), |bound| format!("{bound:.4}")),
+            maker.name().to_owned(),
+            match maker {
+                Maker::Pictures => format!("{own:.1} s"),
+                Maker::Meshopt | Maker::MeshoptAttributes => format!("{asked:.1} s"),
+            },
+        ]);
+        for (other, does) in proposals {
+            let does = match does {
+                Other::Triangles(count) => {
+                    format!(
+                        "{count} triangles, {:.1} %, for the same bound",
+                        share(*count)
+                    )
+                }
+                Other::Excess(excess) => format!("excess {excess:.4} with as many triangles"),
+            };
+            let name = other.name();
+            others += &format!("  {:<16}level {number}, {name}: {does}\n", "beside");
+        }
+    }
+    let mut left = [false; 11];
+    left[9] = true;
+    columns(&rows, &left)
+        + "  floor: the original's own error; excess: what the mesh adds to it, on pictures that had no part in making it\n"
+        + &others
 }
 
 /// The table of how far two meshes are apart.

@@ -13,7 +13,7 @@ mod terminal;
 pub use calibration::calibration;
 pub use comparison::{ComparedAt, Comparison};
 #[cfg(feature = "mesh")]
-pub use meshes::{mesh_error, mesh_error_json, mesh_levels};
+pub use meshes::{mesh_error, mesh_error_json, mesh_levels, seen_mesh};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::emit::LockedGenerated;

@@ -586,8 +586,8 @@ mod tests {
                 "\"teapot\"",
             ),
             (
-                "object = \"rock.obj\"",
-                "there is no object `rock.obj`",
+                "object = \"rock.stl\"",
+                "there is no object `rock.stl`",
                 "\"rock.obj\"",
             ),
             (
@@ -715,7 +715,7 @@ mod tests {
             assert!(place.is_empty() || covered == place, "{text}: {covered}");
         }
         assert!(
-            read("object = \"rock.obj\"")
+            read("object = \"rock.stl\"")
                 .unwrap_err()
                 .notes
                 .join(" ")
