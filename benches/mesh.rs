@@ -22,14 +22,13 @@ const HELD_OUT: usize = 24;
 
 fn main() {
     let numbers = std::env::args().skip(1).filter_map(|a| a.parse().ok());
-    let mut wanted: Vec<usize> = numbers.collect();
+    let mut wanted: Vec<u32> = numbers.collect();
     if wanted.is_empty() {
         wanted = vec![40_000, 70_000];
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let shader = std::env::var("SHADER").unwrap_or("pbr".to_owned());
-    let source =
-        Source::read(&root.join(format!("testdata/materials/{shader}.wgsl"))).expect("it parses");
+    let shader = root.join("testdata/materials/pbr.wgsl");
+    let source = Source::read(&shader).expect("it parses");
     let base = normal_form(&source).expect("it is small");
     let [vertex, fragment] =
         [lodc_passes::Stage::Vertex, lodc_passes::Stage::Fragment].map(|stage| {
@@ -38,44 +37,19 @@ fn main() {
         });
     for triangles in wanted {
         let mut scene = Scene::read(&source, None).expect("it resolves");
-        match std::env::var("MODEL") {
-            Ok(model) => scene = Scene::read_on(&source, None, &model).expect("it resolves"),
-            Err(_) => {
-                scene.mesh = Arc::new(shapes::shape("rock", triangles as u32).expect("it is one"))
-            }
-        }
+        let rock = shapes::shape("rock", triangles).expect("it is one");
+        scene.mesh = Arc::new(rock);
         let subject = Subject {
             vertex: &vertex,
             fragment: &fragment,
             scene: &scene,
         };
         let distance = scene.sphere.radius / (scene.fov.to_radians() / 2.0).sin();
-        let number = |name: &str, otherwise: f64| {
-            std::env::var(name)
-                .ok()
-                .and_then(|v| v.parse().ok())
-                .unwrap_or(otherwise)
-        };
-        let d = Settings::default();
-        let settings = Settings {
-            share: number("SHARE", d.share),
-            accepted: number("ACC", d.accepted),
-            views: number("VIEWS", d.views as f64) as usize,
-            ..d
-        };
         let start = Instant::now();
-        let mut simplifier = Simplifier::new(subject, settings);
+        let mut simplifier = Simplifier::new(subject, Settings::default());
         let rounds = Cell::new(0);
-        let sequence = simplifier.run(distance, Until::Error(0.05), &|watch| {
+        let sequence = simplifier.run(distance, Until::Error(0.05), &|_| {
             rounds.set(rounds.get() + 1);
-            if rounds.get() % 40 == 1 {
-                println!(
-                    "{:.1} s: {} {:.4}",
-                    start.elapsed().as_secs_f64(),
-                    watch.triangles,
-                    watch.excess
-                );
-            }
         });
         println!(
             "{} triangles, {} edges in {} rounds, {:.1} s",

@@ -356,3 +356,66 @@ fn generated_models_are_whole() {
         judge(&[&file]);
     }
 }
+
+#[test]
+fn levels_by_pictures_come_from_the_command_line() {
+    let folder = Folder::new("pictures");
+    let model = folder.write("knot.obj", obj(&shapes::shape("knot", 2000).unwrap()));
+    let shader = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials/clay.wgsl");
+    let scene = fs::read_to_string(shader.with_extension("toml")).unwrap();
+    let scene = folder.write("small.toml", format!("resolution = [64, 64]\n{scene}"));
+    let output = folder.0.join("knot.lod.glb");
+    let run = |rest: &[&str]| {
+        let mut lodc = Command::new(env!("CARGO_BIN_EXE_lodc"));
+        lodc.arg("mesh").arg(&model).arg("--shader").arg(&shader);
+        lodc.arg("--scene")
+            .arg(&scene)
+            .args(["--views", "6"])
+            .args(rest);
+        let run = lodc.output().unwrap();
+        let error = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{error}");
+        String::from_utf8(run.stdout).unwrap()
+    };
+    let table = run(&["--image-error", "0.03,0.01", "-o", output.to_str().unwrap()]);
+    // The columns: level, triangles, share, vertices, ...
+    let triangles = |table: &str| -> Vec<usize> {
+        let rows = table
+            .lines()
+            .map(|line| line.split_whitespace().collect::<Vec<_>>());
+        let levels = rows.filter(|row| row.first().is_some_and(|f| f.parse::<u8>().is_ok()));
+        levels.map(|row| row[1].parse().unwrap()).collect()
+    };
+    let found = triangles(&table);
+    assert!(
+        found.len() == 3 && found.is_sorted_by(|a, b| a > b),
+        "{table}"
+    );
+    let read = ModelFile::read(&output).unwrap();
+    assert_eq!(read.mesh.indices.len() / 3, found[0]);
+    assert!(folder.0.join("knot.meshes.toml").exists());
+    // To a number of triangles, and for the distances of the scene.
+    let found = triangles(&run(&["--triangles", "1200"]));
+    assert!(found[1] <= 1200 && found[1] >= 1198, "{found:?}");
+    let found = triangles(&run(&[]));
+    assert!(
+        found.len() > 3 && found.is_sorted_by(|a, b| a >= b),
+        "{found:?}"
+    );
+}
+
+/// A mesh as OBJ, with all that clay reads.
+fn obj(mesh: &Mesh) -> String {
+    let mut text = String::new();
+    for [x, y, z] in &mesh.positions {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for [x, y, z] in &mesh.normals {
+        text += &format!("vn {x} {y} {z}\n");
+    }
+    for corners in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [corners[0] + 1, corners[1] + 1, corners[2] + 1];
+        text += &format!("f {a}//{a} {b}//{b} {c}//{c}\n");
+    }
+    text
+}

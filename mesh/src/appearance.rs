@@ -21,10 +21,8 @@ pub const CHANNELS: usize = 8;
 /// What changing a triangle costs, over its whole area.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weights {
-    /// For each square of a unit that it is moved off its plane, by how it is shaded.
+    /// For each square of a unit that it is moved off its plane.
     pub position: f64,
-    /// The same, by the outlines that it moves.
-    pub outline: f64,
     /// For each square of a unit that a number of its vertices changes by, in the order of [`channels`].
     pub channels: [f64; CHANNELS],
 }
@@ -77,8 +75,6 @@ pub struct Quadrics {
     /// Places are taken from here, so that little is lost by subtraction.
     origin: DVec3,
     points: Vec<Quadric>,
-    /// By outlines alone.
-    outlines: Vec<Quadric>,
     vertices: Vec<Attributes>,
     /// The channels of each vertex.
     values: Vec<[f64; CHANNELS]>,
@@ -99,7 +95,6 @@ impl Quadrics {
         let mut quadrics = Self {
             origin,
             points: vec![Quadric::default(); surface.points()],
-            outlines: vec![Quadric::default(); surface.points()],
             vertices: vec![Attributes::default(); count],
             values: (0..count as u32).map(|v| channels(mesh, v)).collect(),
         };
@@ -118,10 +113,8 @@ impl Quadrics {
             return;
         };
         let plane = Quadric::plane(p, normal, weights.position / 3.0);
-        let outline = Quadric::plane(p, normal, weights.outline / 3.0);
         for point in points {
             self.points[point as usize].add(&plane);
-            self.outlines[point as usize].add(&outline);
         }
         // The gradient in the plane of a function that is s at the corners.
         let area = cross.length_squared();
@@ -145,7 +138,7 @@ impl Quadrics {
         }
     }
 
-    /// What a collapse costs, in the unit of the weights, but for the outlines that it moves; at least 0.
+    /// What a collapse costs, in the unit of the weights; at least 0.
     pub fn cost(&self, surface: &Surface, collapse: &Collapse) -> f64 {
         let to = surface.position(collapse.to) - self.origin;
         let of_plane = self.points[collapse.from as usize].at(to);
@@ -157,18 +150,10 @@ impl Quadrics {
         (of_plane + of_attributes.sum::<f64>()).max(0.0)
     }
 
-    /// What moving outlines costs; at least 0.
-    pub fn outline_cost(&self, surface: &Surface, collapse: &Collapse) -> f64 {
-        let to = surface.position(collapse.to) - self.origin;
-        self.outlines[collapse.from as usize].at(to).max(0.0)
-    }
-
     /// Hands the sums of what goes to what takes its place.
     pub fn apply(&mut self, collapse: &Collapse) {
         let from = self.points[collapse.from as usize];
         self.points[collapse.to as usize].add(&from);
-        let from = self.outlines[collapse.from as usize];
-        self.outlines[collapse.to as usize].add(&from);
         for (from, onto) in &collapse.vertices {
             let from = self.vertices[*from as usize];
             self.vertices[*onto as usize].add(&from);
@@ -213,7 +198,6 @@ mod tests {
     fn what_is_flat_costs_nothing() {
         let all = Weights {
             position: 1.0,
-            outline: 1.0,
             channels: [1.0; CHANNELS],
         };
         let flat = costs(&grid(6, |_, _| 0.5, |x, y| [x + 0.5 * y, 3.0 * y]), all);

@@ -74,7 +74,7 @@ struct LookArgs {
     /// The distance of the pictures, from the eye to the object's centre [default: where the whole object is in the picture]
     #[arg(long, value_name = "DISTANCE", requires = "shader")]
     at: Option<f64>,
-    /// From how many sides pictures are taken, where the scene does not list them [default: 20]
+    /// From how many sides pictures are taken, where the scene does not list them [default: 60]
     #[arg(long, value_name = "COUNT", requires = "shader", value_parser = clap::value_parser!(u16).range(1..=200))]
     views: Option<u16>,
     /// What refuses an edge whatever pictures say: what has gone would be farther from the surface than --pixels, or the edge is longer

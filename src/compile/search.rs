@@ -361,6 +361,7 @@ fn emit_level(level: &Level, says: &str) -> EmitLevel {
 
 impl Ready {
     /// Warns of levels that fail where the original holds, which only happens where that is allowed.
+    #[allow(clippy::vec_box, reason = "as diagnostics are handed around")]
     fn unstable(&self, found: &Found) -> Vec<Box<Diagnostic>> {
         let levels = found.levels.iter().flat_map(|level| {
             let all = level.unstable.iter();

@@ -5,7 +5,7 @@
 //! a meaning. A pixel's squared difference is its triangle's. In sums over the triangles around a point this is what the
 //! derivative of the error is: a dense mesh has less than a pixel for each triangle, so that single ones would say little.
 
-use super::view::{Drawn, LARGEST_CHANGE};
+use super::view::Drawn;
 use super::{Pictures, Triangles};
 use crate::eval::raster::{Attribute, Frame, Retained};
 use crate::scene::mesh::Mesh;
@@ -23,19 +23,18 @@ const SMALL: f64 = 0.02;
 /// What a triangle that no view sees weighs, as a share of the mean by area of those that are seen.
 const UNSEEN: f64 = 1e-4;
 
-/// How much of what a triangle weighs is that mean, where it is seen: views are few.
-const COMMON: f64 = 0.25;
+/// How much of what a triangle weighs is that mean, where it is seen: of its position, since every part of a surface is an
+/// outline for somebody, and of what its vertices hand over.
+const COMMON: [f64; 2] = [0.5, 0.25];
 
 /// A triangle with less of its share of pixels than this is seen from few sides.
 const SEEN: f64 = 0.1;
 
-/// How many sums there are for a triangle: what the position weighs, what each channel does, what outlines do, and how many pixels
-/// show it.
-const SUMS: usize = CHANNELS + 3;
+/// How many sums there are for a triangle: what the position weighs, what each channel does, and how many pixels show it.
+const SUMS: usize = CHANNELS + 2;
 
-/// The last two of them.
-const OUTLINE: usize = CHANNELS + 1;
-const PIXELS: usize = CHANNELS + 2;
+/// The last of them.
+const PIXELS: usize = CHANNELS + 1;
 
 /// What is changed, and by how much.
 #[derive(Clone, Copy)]
@@ -180,11 +179,7 @@ fn add(
             .sum::<f64>()
             / 6.0;
         match change {
-            Change::Position(step) => {
-                let shaded = square.min(f64::from(LARGEST_CHANGE));
-                sums[0] += shaded / (step * step);
-                sums[OUTLINE] += (square - shaded) / (step * step);
-            }
+            Change::Position(step) => sums[0] += square / (step * step),
             Change::Channel(channel, step) => sums[channel + 1] += square / (step * step),
         }
     }
@@ -236,14 +231,12 @@ fn smooth((surface, triangles): (&Surface, &Triangles), sums: &[[f64; SUMS]]) ->
         let is_seen = (density(PIXELS) / (SEEN * mean[PIXELS])).min(1.0);
         let is_seen = if is_seen.is_nan() { 0.0 } else { is_seen };
         let part = |i: usize| {
-            let common = COMMON * is_seen;
+            let common = COMMON[usize::from(i > 0)] * is_seen;
             let own = (1.0 - common) * density(i) + common * mean[i];
             area(corners) * (own + UNSEEN * mean[i])
         };
         Weights {
             position: part(0),
-            // Wherever it is, somebody sees it as an outline.
-            outline: area(corners) * mean[OUTLINE] * (is_seen + UNSEEN),
             channels: std::array::from_fn(|channel| part(channel + 1)),
         }
     };

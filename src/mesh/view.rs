@@ -9,10 +9,6 @@ use crate::scene::mesh::Draw;
 /// Samples of the reference in a pixel, along each axis.
 const GRID: u32 = 4;
 
-/// The most that a pixel counts as changed, squared. What changes more is an outline that has moved over a sample: whether it
-/// did is chance, and pictures of a few sides say little of how often it does.
-pub(super) const LARGEST_CHANGE: f32 = 0.0025;
-
 /// A picture, and what it should show.
 pub(super) struct View {
     frame: Frame,
@@ -33,7 +29,7 @@ pub(super) struct View {
 pub(super) struct Picture {
     /// The squared difference from the reference, the mean over backgrounds and channels.
     errors: Vec<f32>,
-    /// The same from the original's picture with the same samples, which aliases alike; at most [`LARGEST_CHANGE`].
+    /// The same from the original's picture with the same samples, which aliases alike.
     changes: Vec<f32>,
     /// The depth of what is seen; where nothing is, or where depths say nothing of what is seen, 1.
     depths: Vec<f32>,
@@ -172,8 +168,7 @@ impl View {
                 let change = shown[i / 3][i % 3] - original[i / 3][i % 3];
                 // As wrong as a colour can be.
                 if change.is_nan() { 1.0 } else { change }
-            }))
-            .min(LARGEST_CHANGE),
+            })),
         });
         let mut depths = vec![1.0; self.reference.len()];
         if !self.retained.is_layered() && !self.is_lit {

@@ -355,8 +355,8 @@ impl<'a> Interface<'a> {
                 }
                 if attribute == 5 {
                     for corner in &mut quad.corners {
-                        for at in COLOUR..NUMBERS {
-                            corner[at] = corner[at].clamp(0.0, 1.0);
+                        for number in &mut corner[COLOUR..NUMBERS] {
+                            *number = number.clamp(0.0, 1.0);
                         }
                     }
                 }

@@ -77,7 +77,7 @@ pub(crate) struct Exhibit {
 #[derive(Clone)]
 enum Inputs {
     /// Fragments of a picture.
-    Seen(Coverage),
+    Seen(Box<Coverage>),
     /// Declared ones.
     Made(Group),
 }
@@ -207,7 +207,7 @@ impl<'a> Battery<'a> {
             let apart = squares.len().div_ceil(SQUARES).max(1);
             let kept: BTreeSet<_> = squares.into_iter().step_by(apart).collect();
             let part = coverage.part(|square| kept.contains(&square));
-            (frame, Inputs::Seen(part))
+            (frame, Inputs::Seen(Box::new(part)))
         });
         let mut all: Vec<(Frame, Inputs)> = seen.collect();
         for group in battery.interface.declared(GROUPS) {

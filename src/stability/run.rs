@@ -138,7 +138,7 @@ impl Battery<'_> {
                 let vertex = subject.vertex(self.stand);
                 let more = match subject.own_vertex {
                     true => Cow::Owned(coverage.with_inputs_of(vertex, fragment, &frame)),
-                    false => Cow::Borrowed(coverage),
+                    false => Cow::Borrowed(&**coverage),
                 };
                 Given {
                     frame,
