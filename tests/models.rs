@@ -393,7 +393,7 @@ fn levels_by_pictures_come_from_the_command_line() {
     );
     let read = ModelFile::read(&output).unwrap();
     assert_eq!(read.mesh.indices.len() / 3, found[0]);
-    assert!(folder.0.join("knot.meshes.toml").exists());
+    assert!(folder.0.join("knot.lod.meshes.toml").exists());
     // To a number of triangles, and for the distances of the scene.
     let found = triangles(&run(&["--triangles", "1200"]));
     assert!(found[1] <= 1200 && found[1] >= 1198, "{found:?}");

@@ -226,8 +226,8 @@ mod tests {
             };
             let [validation, _] = levels.judges(wanted.distance);
             assert!(validation.excess(&level.triangles) <= bound);
-            // Pictures that nobody has seen agree, but for chance.
-            assert!(level.excess <= 1.3 * bound, "{} {bound}", level.excess);
+            // Pictures that nobody has seen agree, but for chance: a few pixels of outline in small pictures.
+            assert!(level.excess <= 2.0 * bound, "{} {bound}", level.excess);
             let count = level.triangles.count();
             assert!(count < before, "{count} of {before}");
             before = count;

@@ -588,7 +588,7 @@ mod tests {
             (
                 "object = \"rock.stl\"",
                 "there is no object `rock.stl`",
-                "\"rock.obj\"",
+                "\"rock.stl\"",
             ),
             (
                 "resolution = [0, 256]",
@@ -719,7 +719,7 @@ mod tests {
                 .unwrap_err()
                 .notes
                 .join(" ")
-                .contains("export it as .gltf or .glb")
+                .contains("export it as")
         );
     }
 }
