@@ -48,8 +48,8 @@ pub enum EdgeRule {
 /// How a mesh is simplified.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// How many views it is seen from at least. With few of them edges go that happen to be between their samples: 60 left 10 to 20 % less
-    /// error than 20 on pictures that had no part in it, at three times the time (`cargo bench --bench mesh`).
+    /// How many views it is seen from at least. With few of them edges go that happen to be between their samples: on a rock of
+    /// 20,000 triangles with clay 60 left 13 to 29 % less excess than 20 on pictures that had no part in it, at three times the time.
     pub views: usize,
     /// What is refused beyond [`Settings::most_pixels`].
     pub rule: EdgeRule,
