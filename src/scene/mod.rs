@@ -167,6 +167,7 @@ pub enum Split {
 }
 
 /// What the seeds of pictures for a mesh are made with, beside those of [`Split`].
+#[cfg(feature = "mesh")]
 const ALL_AROUND: u64 = 3;
 
 /// The most pictures at one distance: what a search can look at, in memory that does not grow with the scene.
@@ -566,6 +567,7 @@ impl Scene {
 
     /// The pictures that a mesh is simplified by, at a distance: of the scene's own views where it lists them, else of `count`
     /// at least, spread in the same way; of each one sample of the uniforms, in turn, and an offset of its own.
+    #[cfg(feature = "mesh")]
     pub(crate) fn all_around(&self, distance: f64, count: usize) -> Vec<Frame> {
         let views = match self.around {
             Around::Cap(axis, angle) if self.views.len() < count && self.views.len() > 1 => {

@@ -13,6 +13,7 @@
 mod more;
 mod part;
 mod quads;
+#[cfg(feature = "mesh")]
 mod retained;
 mod shape;
 mod spots;
@@ -22,6 +23,7 @@ mod triangle;
 mod vertices;
 
 pub(crate) use quads::Quad;
+#[cfg(feature = "mesh")]
 pub(crate) use retained::{Retained, Squares};
 pub(crate) use shape::{Shape, shape};
 pub(crate) use spots::{Spot, on_spots};

@@ -11,6 +11,7 @@ impl Coverage {
     }
 
     /// The fine pixel of every covered fragment, in order, with its depth and its triangle: the draw, and the number in that.
+    #[cfg(feature = "mesh")]
     pub(crate) fn triangles(&self) -> impl Iterator<Item = (u32, f32, (usize, u32))> + '_ {
         self.blocks.iter().flat_map(|block| {
             block.covered.lanes().filter_map(|lane| {

@@ -1,8 +1,10 @@
 //! Quads of fragments: which are seen, and the inputs of the fragment program for them.
 
+#[cfg(feature = "mesh")]
+use super::Squares;
 use super::triangle::Triangle;
 use super::vertices::Vertices;
-use super::{Block, Squares, Target};
+use super::{Block, Target};
 use crate::eval::lane::{LANES, Mask};
 use crate::eval::program::Slot;
 use naga::{Binding, BuiltIn, Interpolation, ScalarKind};
@@ -24,6 +26,7 @@ pub(crate) struct Quad {
     mask: u8,
 }
 
+#[cfg(feature = "mesh")]
 impl Quad {
     /// Whether its square is one of these.
     pub(super) fn is_in(&self, squares: &Squares) -> bool {
