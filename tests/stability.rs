@@ -119,11 +119,13 @@ fn traps_are_found_with_their_lines_and_innocents_are_not_flagged() {
     assert!(counts[0] >= 12 && counts[1] >= 12, "{counts:?}");
 }
 
-/// A trap in a folder of its own, with a scene that is quick to search.
-fn small(name: &str) -> PathBuf {
+/// A trap in the folder of a test, with a scene that is quick to search.
+///
+/// Tests run at the same time: no two of them may name one folder.
+fn small(test: &str, name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("stability")
-        .join(name);
+        .join(test);
     fs::create_dir_all(&folder).expect("the folder can be written");
     let from = Path::new("testdata/stability").join(name);
     let to = folder.join("trap.wgsl");
@@ -146,7 +148,7 @@ fn compiled(shader: &Path, unstable: bool) -> Compiled {
 /// Guards that no picture needs are all that can be saved within a small bound.
 #[test]
 fn the_search_avoids_what_it_would_choose_otherwise() {
-    let shader = small("normalize_of_what_can_vanish");
+    let shader = small("avoids", "normalize_of_what_can_vanish");
     let text = fs::read_to_string(&shader).expect("it was written");
     let (head, _) = text
         .split_once("@fragment")
@@ -187,7 +189,7 @@ fn fs_main(in: Varyings) -> @location(0) vec4f {
 
 #[test]
 fn the_worst_inputs_are_written_and_looked_at_again() {
-    let shader = small("normalize_of_what_can_vanish");
+    let shader = small("worst_inputs", "normalize_of_what_can_vanish");
     let text = fs::read_to_string(&shader).expect("it was written");
     // Without its guard.
     let bare = text.replace("max(square, 0.00000001)", "square");
