@@ -2,7 +2,7 @@
 
 use super::progress::Bar;
 use super::{ReadingArgs, print, print_diagnostic, write};
-use crate::compile::{self, Length, MeshGoals, MeshRequest, PictureGoals, PictureRequest};
+use crate::compile::{self, Length, MeshGoals, MeshRequest, PictureGoals, PictureRequest, Request};
 use crate::mesh::{EdgeRule, Settings};
 use crate::{Diagnostic, Result, report};
 use clap::Args;
@@ -143,10 +143,13 @@ fn by_pictures(arguments: MeshArgs, shader: PathBuf) -> Result<()> {
     }
     let request = PictureRequest {
         model: arguments.model,
-        shader,
-        stages,
-        modules,
-        scene: look.scene,
+        request: Request {
+            shader,
+            stages,
+            modules,
+            scene: look.scene,
+            ..Request::default()
+        },
         goals: if !goals.image_error.is_empty() {
             PictureGoals::Errors(goals.image_error)
         } else if !goals.triangles.is_empty() {

@@ -90,9 +90,7 @@ impl Read {
         let source = Source::read_with(&request.shader, &request.stages, &request.modules)?;
         // What the evaluator cannot run is said before the scene asks for values of it.
         let base = normal_form(&source)?;
-        let fragment = base.index(Stage::Fragment).unwrap_or(0);
-        Program::compile(base.module(), fragment, &[])
-            .map_err(|refused| refusal(&refused, &source))?;
+        fragment_program(&base).map_err(|refused| refusal(&refused, &source))?;
         Ok(Self {
             request,
             source,
@@ -148,6 +146,11 @@ impl Ready {
         vertex_program(&self.scene, &self.base).map_err(|refused| refusal(&refused, &self.source))
     }
 
+    /// The fragment program.
+    pub(super) fn fragment(&self) -> Result<Program> {
+        fragment_program(&self.base).map_err(|refused| refusal(&refused, &self.source))
+    }
+
     /// What a search measures with.
     pub(super) fn stand<'a>(&'a self, vertex: &'a Program) -> Stand<'a> {
         Stand {
@@ -156,6 +159,11 @@ impl Ready {
             scene: &self.scene,
         }
     }
+}
+
+/// The fragment program of a shader.
+fn fragment_program(base: &Shader) -> std::result::Result<Program, Refused> {
+    Program::compile(base.module(), base.index(Stage::Fragment).unwrap_or(0), &[])
 }
 
 /// The vertex program of a shader in its scene: its own, or the one that lodc supplies.
@@ -172,9 +180,7 @@ pub(super) fn vertex_program(
 impl Ready {
     /// Draws some of the first frame, since a loop that does not end would be run for every pixel of all frames.
     pub(super) fn ends(&self, vertex: &Program) -> Result<()> {
-        let fragment = self.base.index(Stage::Fragment).unwrap_or(0);
-        let fragment = Program::compile(self.base.module(), fragment, &[])
-            .map_err(|refused| refusal(&refused, &self.source))?;
+        let fragment = self.fragment()?;
         let Some(frame) = self.scene.frames(self.scene.nearest).into_iter().next() else {
             return Ok(());
         };

@@ -1,17 +1,14 @@
 //! Levels of a model's mesh by its pictures, under the shader that it is drawn with.
 
 use super::mesh::{check_output, from_distance};
-use super::{Files, ModelFile, normal_form, relative};
-use crate::eval::program::Program;
-use crate::eval::refusal;
-use crate::front::{Modules, Source, Stages};
+use super::search::Read;
+use super::{Files, ModelFile, Request, relative};
 use crate::mesh::{LevelMesh, Levels, Maker, Other, Settings, Subject, Until, Wanted};
 use crate::scene::Scene;
 use crate::{Diagnostic, Result};
 use lodc_mesh::Mesh;
 use lodc_mesh::distance::{Distance, Reference};
 use lodc_mesh::write::{Level, Sight};
-use lodc_passes::Stage;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -31,14 +28,8 @@ pub enum PictureGoals {
 pub struct PictureRequest {
     /// The model: glTF, GLB, OBJ or PLY.
     pub model: PathBuf,
-    /// The shader that it is drawn with.
-    pub shader: PathBuf,
-    /// Its entry points, where there are several.
-    pub stages: Stages,
-    /// The modules that it may import.
-    pub modules: Modules,
-    /// The scene, whose object the model takes the place of; by default the shader's name with `.toml`, when that is there.
-    pub scene: Option<PathBuf>,
+    /// The shader that it is drawn with, how that is read, and the scene, whose object the model takes the place of.
+    pub request: Request,
     /// How far its levels go.
     pub goals: PictureGoals,
     /// The distance of the pictures, from the eye to the centre of the object, for all goals but the scene's own; by default where the
@@ -111,29 +102,21 @@ pub struct Seeing {
 pub fn mesh_by_pictures(request: &PictureRequest, progress: &dyn Fn(Seeing)) -> Result<SeenMesh> {
     check_output(request.output.as_deref(), &request.model)?;
     let model = ModelFile::read(&request.model)?;
-    let source = Source::read_with(&request.shader, &request.stages, &request.modules)?;
-    let base = normal_form(&source)?;
-    let folder = Scene::path(&source, request.scene.as_deref());
-    let folder = folder.as_deref().or(source.path.as_deref());
-    let folder = folder.and_then(Path::parent).unwrap_or(Path::new(""));
-    let object = relative(folder, &request.model);
-    let scene = Scene::read_on(&source, request.scene.as_deref(), &object)?;
-    let program = |stage| match base.index(stage) {
-        Some(entry) => Program::compile(base.module(), entry, &[])
-            .map_err(|refused| refusal(&refused, &source)),
-        None => Err(Diagnostic::error(format!(
-            "`{}` has no vertex stage, and a mesh cannot be drawn without",
-            source.name
-        ))
-        .with_note("name one with `--vertex-file`")),
-    };
-    let (vertex, fragment) = (program(Stage::Vertex)?, program(Stage::Fragment)?);
+    let read = Read::new(&request.request)?;
+    let named_from = read.scene_file.as_ref().unwrap_or(&request.request.shader);
+    let object = relative(named_from.parent().unwrap_or(Path::new("")), &request.model);
+    let scene = Scene::read_on(&read.source, read.scene_file.as_deref(), &object)?;
+    let ready = read.ready(scene);
+    let vertex = ready.vertex()?;
+    ready.ends(&vertex)?;
+    let fragment = ready.fragment()?;
+    let scene = &ready.scene;
     let subject = Subject {
         vertex: &vertex,
         fragment: &fragment,
-        scene: &scene,
+        scene,
     };
-    let all = wanted(request, &scene)?;
+    let all = wanted(request, scene)?;
     let mut warnings = model.warnings.clone();
     let is_new =
         |warning: &&Diagnostic| !model.warnings.iter().any(|w| w.message == warning.message);

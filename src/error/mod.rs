@@ -26,6 +26,11 @@ pub use figures::{Details, ErrorFigures};
 pub use held_out::HeldOut;
 pub(crate) use held_out::exceeds;
 pub(crate) use pixel::{BACKGROUNDS, ReferencePixel, Shown};
+#[cfg(feature = "mesh")]
+pub(crate) use shown::Means;
 pub(crate) use shown::{colours, over_black, reference_of};
 pub use tally::ErrorSum;
 pub(crate) use tally::{FrameError, Reference, TILE, Tally};
+
+/// Samples of the reference in a pixel, along each axis.
+pub(crate) const GRID: u32 = 4;

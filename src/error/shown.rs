@@ -13,11 +13,9 @@ pub(crate) fn reference_of<'c>(
     coverages: impl Iterator<Item = &'c Coverage>,
     output: Output,
 ) -> (Reference, Vec<u32>) {
-    let (picture, behind) = over_black(fine, shading, output);
-    let picture = picture.box_filtered(fine.grid);
-    let behind = behind.map(|behind| behind.box_filtered(fine.grid));
+    let means = Means::of(fine, shading, output);
     let mut pixels: Vec<u32> = (0..)
-        .zip(&picture.covered)
+        .zip(means.covered())
         .filter(|(_, c)| **c > 0.0)
         .map(|(i, _)| i)
         .collect();
@@ -26,16 +24,42 @@ pub(crate) fn reference_of<'c>(
     pixels.dedup();
     let reference = Reference::new(pixels.iter().map(|pixel| {
         let at = *pixel as usize;
-        let [r, g, b, _] = picture.pixels[at];
-        let covered = picture.covered[at];
-        let through = match &behind {
-            Some(behind) => [0, 1, 2].map(|i| behind.pixels[at][i]),
-            None => [1.0 - covered; 3],
-        };
-        let place = [*pixel % picture.width, *pixel / picture.width];
-        (place, ReferencePixel::new([r, g, b], through), covered)
+        let place = [*pixel % means.picture.width, *pixel / means.picture.width];
+        (place, means.pixel(at), means.covered()[at])
     }));
     (reference, pixels)
+}
+
+/// The means of a reference's fine pixels over each pixel.
+pub(crate) struct Means {
+    picture: Picture,
+    behind: Option<Picture>,
+}
+
+impl Means {
+    /// Of fragments at so many fine pixels a pixel as their coverage has.
+    pub(crate) fn of(fine: &Coverage, shading: &Shading, output: Output) -> Self {
+        let (picture, behind) = over_black(fine, shading, output);
+        Self {
+            picture: picture.box_filtered(fine.grid),
+            behind: behind.map(|behind| behind.box_filtered(fine.grid)),
+        }
+    }
+
+    /// How much of each pixel is covered, row by row.
+    pub(crate) fn covered(&self) -> &[f32] {
+        &self.picture.covered
+    }
+
+    /// What a pixel should show.
+    pub(crate) fn pixel(&self, at: usize) -> ReferencePixel {
+        let [r, g, b, _] = self.picture.pixels[at];
+        let through = match &self.behind {
+            Some(behind) => [0, 1, 2].map(|i| behind.pixels[at][i]),
+            None => [1.0 - self.picture.covered[at]; 3],
+        };
+        ReferencePixel::new([r, g, b], through)
+    }
 }
 
 /// What a display shows over black, in linear light, and, where fragments are blended, how much more over white.

@@ -29,6 +29,7 @@ use super::reaction::weights;
 use super::selection::{Sequence, Step};
 use super::view::{Part, Picture, View};
 use super::{Pictures, Subject, Triangles};
+use crate::eval::raster::Squares;
 use glam::DVec3;
 use lodc_mesh::{Collapse, Quadrics, Surface};
 use lodc_passes::autolod;
@@ -422,7 +423,8 @@ impl Round<'_, '_> {
         let (mut small, mut set): (Vec<Tried>, Vec<Tried>) = (Vec::new(), Vec::new());
         let mut guessed = 0.0;
         let most_guessed = SHARE_OF_ROOM * (most_error - self.error) / self.scale();
-        let mut claimed: Vec<_> = self.views.iter().map(|v| v.squares(false)).collect();
+        let views = self.views.iter();
+        let mut claimed: Vec<_> = views.map(|v| Squares::new(v.size(), false)).collect();
         let mut taken = vec![false; self.best.len()];
         for (number, chunk) in order.chunks(CHUNK).enumerate() {
             let count = small.len() + set.len();
@@ -549,7 +551,7 @@ impl Round<'_, '_> {
     /// nothing, outer none where it cannot be told.
     fn part(&self, view: &View, ends: &[Collapse]) -> Option<Option<(Part, f64)>> {
         let surface = &self.simplifier.surface;
-        let spots = view.retained().spots();
+        let spots = view.retained().on_screen();
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         let mut nearest = f32::INFINITY;
         let mut area = 0.0;
@@ -571,8 +573,7 @@ impl Round<'_, '_> {
                 }
             }
         }
-        let none = view.squares(false);
-        let Some(part) = none.around(low, high).map(Part) else {
+        let Some(part) = Squares::around(view.size(), low, high).map(Part) else {
             return Some(None);
         };
         let is_hidden = nearest > view.picture().farthest(&part, view.size());
@@ -773,6 +774,17 @@ mod tests {
                 }
             });
         }
+    }
+
+    #[test]
+    fn a_deferred_material_loses_edges_that_its_pictures_show() {
+        with("gbuffer", None, |subject, distance| {
+            let all = subject.scene.mesh.indices.len() / 3;
+            let mut simplifier = Simplifier::new(subject, FEW);
+            simplifier.run(distance, Until::Triangles(all / 4), &|_| {});
+            let left = simplifier.surface().triangle_count();
+            assert!(left <= all / 4, "{left} of {all}");
+        });
     }
 
     #[test]

@@ -1,13 +1,10 @@
 //! A picture of a mesh from one side, kept up to date while the mesh loses edges: only squares that change are drawn again.
 
 use super::{Subject, Triangles};
-use crate::error::{BACKGROUNDS, ReferencePixel, Shown, colours, over_black};
+use crate::error::{BACKGROUNDS, GRID, Means, ReferencePixel, Shown, colours};
 use crate::eval::draw::{Shading, shade_lit};
 use crate::eval::raster::{Coverage, Frame, Retained, Squares, rasterize};
 use crate::scene::mesh::Draw;
-
-/// Samples of the reference in a pixel, along each axis.
-const GRID: u32 = 4;
 
 /// A picture, and what it should show.
 pub(super) struct View {
@@ -53,24 +50,15 @@ impl View {
         };
         let coverage = rasterize(subject.vertex, subject.fragment, &fine);
         let shading = shade(subject, &fine, &coverage);
-        let (picture, behind) = over_black(&coverage, &shading, subject.scene.output);
-        let picture = picture.box_filtered(GRID);
-        let behind = behind.map(|behind| behind.box_filtered(GRID));
-        let pixels = picture.pixels.iter().zip(&picture.covered).enumerate();
-        let reference = pixels.map(|(at, ([r, g, b, _], covered))| {
-            let through = match &behind {
-                Some(behind) => [0, 1, 2].map(|i| behind.pixels[at][i]),
-                None => [1.0 - covered; 3],
-            };
-            ReferencePixel::new([*r, *g, *b], through)
-        });
-        let pixels = picture.pixels.len();
+        let means = Means::of(&coverage, &shading, subject.scene.output);
+        let covered = means.covered();
+        let pixels = covered.len();
         let mut view = Self {
             retained: Retained::new(subject.vertex, subject.fragment, &frame),
             draws: frame.mesh.draws(),
             is_lit: subject.scene.lighting.is_some(),
-            reference: reference.collect(),
-            coverage: picture.covered.iter().map(|c| f64::from(*c)).sum(),
+            reference: (0..pixels).map(|at| means.pixel(at)).collect(),
+            coverage: covered.iter().map(|c| f64::from(*c)).sum(),
             original: vec![BACKGROUNDS; pixels],
             picture: Picture {
                 errors: vec![0.0; pixels],
@@ -81,8 +69,9 @@ impl View {
         };
         let (whole, squares) = (Triangles::whole(&view.frame.mesh), view.squares(true));
         let of_original = (&view.retained, &view.frame);
-        view.original = view.draw(subject, of_original, &whole, &squares).shown;
-        view.picture = view.look(subject, &whole, &squares);
+        let drawn = view.draw(subject, of_original, &whole, &squares);
+        view.original.clone_from(&drawn.shown);
+        view.picture = view.judge(&drawn);
         view
     }
 
@@ -119,7 +108,7 @@ impl View {
         triangles: &Triangles,
         squares: &Squares,
     ) -> Drawn {
-        let spots = retained.spots();
+        let (spots, size) = (retained.on_screen(), self.size());
         let is_near = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|vertex| spots.get(vertex as usize).copied().flatten());
             let (Some(a), Some(b), Some(c)) = (a, b, c) else {
@@ -127,7 +116,7 @@ impl View {
             };
             let low = [0, 1].map(|i| a.at[i].min(b.at[i]).min(c.at[i]));
             let high = [0, 1].map(|i| a.at[i].max(b.at[i]).max(c.at[i]));
-            let around = squares.around(low, high);
+            let around = Squares::around(size, low, high);
             around.is_some_and(|around| squares.any(&around))
         };
         let draws = self.draws.iter().map(|draw| {
@@ -154,7 +143,11 @@ impl View {
         triangles: &Triangles,
         squares: &Squares,
     ) -> Picture {
-        let drawn = self.draw(subject, (&self.retained, &self.frame), triangles, squares);
+        self.judge(&self.draw(subject, (&self.retained, &self.frame), triangles, squares))
+    }
+
+    /// How wrong that is which was drawn.
+    fn judge(&self, drawn: &Drawn) -> Picture {
         let square = |six: [f32; 6]| six.iter().map(|d| d * d).sum::<f32>() / 6.0;
         let pixels = self.reference.iter().zip(&drawn.shown);
         let errors = pixels.map(|(reference, shown)| match shown == &BACKGROUNDS {

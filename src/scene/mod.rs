@@ -286,7 +286,7 @@ impl Scene {
     }
 
     /// The scene file that is meant: the one at `path`, or else the one beside the shader, if there is one.
-    pub(crate) fn path(source: &Source, path: Option<&Path>) -> Option<PathBuf> {
+    fn path(source: &Source, path: Option<&Path>) -> Option<PathBuf> {
         let beside = || Some(source.path.as_ref()?.with_extension("toml")).filter(|p| p.exists());
         path.map(PathBuf::from).or_else(beside)
     }

@@ -7,12 +7,11 @@
 //! Frames, seeds and offsets are those of [`super::SampleSet`], all pixels of each; what is added up beyond tiles is
 //! added up by the same code.
 
-use super::frame::GRID;
 use super::samples::{OverBlack, offsets};
 use crate::Result;
 use crate::error::{
-    BACKGROUNDS, Details, ErrorFigures, FrameError, Reference, ReferencePixel, Shown, displayed,
-    encoded, through,
+    BACKGROUNDS, Details, ErrorFigures, FrameError, GRID, Reference, ReferencePixel, Shown,
+    displayed, encoded, through,
 };
 use crate::eval::image::Picture;
 use crate::eval::raster::Frame;

@@ -3,7 +3,8 @@
 
 use super::programs::Programs;
 use crate::error::{
-    FrameError, Reference, Shown, TILE, Tally, colours, encoded, held, over_black, reference_of,
+    FrameError, GRID, Reference, Shown, TILE, Tally, colours, encoded, held, over_black,
+    reference_of,
 };
 use crate::eval::draw::{Lit, Seen, Shading, seen, shade_into, shade_lit};
 use crate::eval::machine::{Bindings, Profile};
@@ -17,9 +18,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Of how many vertex stages that variants have of their own it is kept what they hand over.
 const KEPT: usize = 4;
-
-/// Fine pixels of the reference to a pixel, along each axis.
-pub(super) const GRID: u32 = 4;
 
 /// How much of a frame is looked at.
 #[derive(Clone, Copy, Debug)]

@@ -184,31 +184,10 @@ fn cover(
     target: &Target,
     (late, states): (bool, &Arc<[DrawState]>),
 ) -> Coverage {
-    let Triangles {
-        triangles,
-        ends,
-        blended,
-    } = Triangles::of(&vertices.positions, mesh, target, states);
-    let quads = if late {
-        quads::in_order(&triangles)
-    } else {
-        quads::visible(&triangles, &blended, target)
-    };
-    let quads = quads::by_draw(quads, &ends);
-    let blocks = quads::blocks(&quads, &triangles, &vertices, outputs, inputs, target);
-    let fragments = blocks.last().map_or(0, |b| b.first + b.covered_count());
-    Coverage {
-        width: target.width,
-        height: target.height,
-        grid: target.grid,
-        blocks,
-        fragments,
-        drawn: fragments,
-        slots: inputs.to_vec(),
-        late,
-        states: states.clone(),
-        vertex_profile: vertices.profile,
-    }
+    let all = Triangles::of(&vertices.positions, mesh, target, states);
+    all.cover(&vertices, [outputs, inputs], target, (late, states), |_| {
+        true
+    })
 }
 
 /// The triangles of a mesh that may cover something, draw by draw.
@@ -221,31 +200,75 @@ struct Triangles {
 }
 
 impl Triangles {
+    /// All of a mesh.
     fn of(positions: &[[f32; 4]], mesh: &Mesh, target: &Target, states: &Arc<[DrawState]>) -> Self {
-        let mut triangles = Vec::new();
-        let mut ends = Vec::new();
-        let mut blended = Vec::new();
-        for (number, draw) in mesh.draws().into_iter().enumerate() {
-            let state = state_of(states, number);
+        let draws = mesh.draws().into_iter().map(|draw| {
             let indices = mesh
                 .indices
                 .get(3 * draw.triangles.start..3 * draw.triangles.end);
-            let corners = indices.unwrap_or_default().chunks_exact(3).enumerate();
-            let first = triangles.len();
-            triangles.extend(corners.filter_map(|(i, corners)| {
-                let corners = [corners[0], corners[1], corners[2]];
-                triangle::Triangle::new(i as u32, corners, positions, target)
+            let corners = indices.unwrap_or_default().chunks_exact(3);
+            (0..).zip(corners.map(|corners| [corners[0], corners[1], corners[2]]))
+        });
+        Self::of_draws(positions, draws, target, states)
+    }
+
+    /// Some of each draw: their numbers in the draw, and their vertices.
+    fn of_draws(
+        positions: &[[f32; 4]],
+        draws: impl Iterator<Item = impl Iterator<Item = (u32, [u32; 3])>>,
+        target: &Target,
+        states: &[DrawState],
+    ) -> Self {
+        let mut all = Self {
+            triangles: Vec::new(),
+            ends: Vec::new(),
+            blended: Vec::new(),
+        };
+        for (number, draw) in draws.enumerate() {
+            let state = state_of(states, number);
+            let first = all.triangles.len();
+            all.triangles.extend(draw.filter_map(|(index, corners)| {
+                triangle::Triangle::new(index, corners, positions, target)
                     .filter(|triangle| triangle.front || !state.front_only)
             }));
-            ends.push(triangles.len());
+            all.ends.push(all.triangles.len());
             if state.blend != Blend::Opaque {
-                blended.push(first..triangles.len());
+                all.blended.push(first..all.triangles.len());
             }
         }
-        Self {
-            triangles,
-            ends,
-            blended,
+        all
+    }
+
+    /// Their fragments, of the quads that are kept, from the outputs of the vertex program for the inputs of the fragment
+    /// program.
+    fn cover(
+        &self,
+        vertices: &vertices::Vertices,
+        [outputs, inputs]: [&[Slot]; 2],
+        target: &Target,
+        (late, states): (bool, &Arc<[DrawState]>),
+        keep: impl Fn(&Quad) -> bool,
+    ) -> Coverage {
+        let mut quads = if late {
+            quads::in_order(&self.triangles)
+        } else {
+            quads::visible(&self.triangles, &self.blended, target)
+        };
+        quads.retain(keep);
+        let quads = quads::by_draw(quads, &self.ends);
+        let blocks = quads::blocks(&quads, &self.triangles, vertices, outputs, inputs, target);
+        let fragments = blocks.last().map_or(0, |b| b.first + b.covered_count());
+        Coverage {
+            width: target.width,
+            height: target.height,
+            grid: target.grid,
+            blocks,
+            fragments,
+            drawn: fragments,
+            slots: inputs.to_vec(),
+            late,
+            states: states.clone(),
+            vertex_profile: vertices.profile.clone(),
         }
     }
 }

@@ -1,9 +1,8 @@
 //! A frame that is drawn again and again while its mesh loses triangles: its vertices are shaded once, and only some squares
 //! of the picture are drawn anew.
 
-use super::triangle::Triangle;
-use super::{Coverage, Frame, Target, is_late, quads, vertices};
-use crate::eval::draw::{Blend, DrawState, state_of};
+use super::{Coverage, Frame, Target, Triangles, is_late, vertices};
+use crate::eval::draw::{Blend, DrawState};
 use crate::eval::program::{Program, Slot};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -16,12 +15,12 @@ pub(crate) struct Retained {
     target: Target,
     late: bool,
     states: Arc<[DrawState]>,
-    spots: Vec<Option<Spot>>,
+    on_screen: Vec<Option<OnScreen>>,
 }
 
 /// Where a vertex is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Spot {
+pub(crate) struct OnScreen {
     /// In fine pixels from the left and from the top.
     pub(crate) at: [f32; 2],
     /// 0 at the near plane, 1 at the far one.
@@ -50,15 +49,17 @@ impl Squares {
         }
     }
 
-    /// The squares that may show something of what is seen within a box of spots; none when that is outside of the picture.
-    pub(crate) fn around(&self, low: [f32; 2], high: [f32; 2]) -> Option<SquareBox> {
-        let range = |i: usize, count: u32| {
+    /// The squares of a picture of a size that may show something of what is seen within a box of places; none when that is outside
+    /// of the picture.
+    pub(crate) fn around(size: [u32; 2], low: [f32; 2], high: [f32; 2]) -> Option<SquareBox> {
+        let range = |i: usize| {
+            let count = size[i].div_ceil(2);
             // A centre half a pixel away may be covered, since corners are snapped.
             let first = ((low[i] - 0.5) / 2.0).floor().max(0.0);
             let last = ((high[i] + 0.5) / 2.0).floor().min(count as f32 - 1.0);
             (first <= last).then_some(first as u32..=last as u32)
         };
-        Some([range(0, self.across)?, range(1, self.down)?])
+        Some([range(0)?, range(1)?])
     }
 
     fn row(&self, row: u32, columns: &RangeInclusive<u32>) -> std::ops::Range<usize> {
@@ -100,7 +101,7 @@ impl Retained {
         let vertices = vertices::run(vertex, frame);
         let target = Target::of(frame);
         let [width, height] = [target.width, target.height].map(f64::from);
-        let spots = vertices.positions.iter().map(|position| {
+        let on_screen = vertices.positions.iter().map(|position| {
             let [x, y, z, w] = position.map(f64::from);
             let grid = f64::from(target.grid);
             let at = [
@@ -109,13 +110,13 @@ impl Retained {
             ];
             let depth = z / w;
             let is_seen = w > 0.0 && depth >= 0.0 && at.iter().all(|c| c.is_finite());
-            is_seen.then_some(Spot {
+            is_seen.then_some(OnScreen {
                 at: at.map(|c| c as f32),
                 depth: depth as f32,
             })
         });
         Self {
-            spots: spots.collect(),
+            on_screen: on_screen.collect(),
             outputs: vertex.outputs().to_vec(),
             inputs: fragment.inputs().to_vec(),
             late: is_late(fragment),
@@ -126,8 +127,8 @@ impl Retained {
     }
 
     /// Where each vertex of the mesh is seen; none that is not before the near plane.
-    pub(crate) fn spots(&self) -> &[Option<Spot>] {
-        &self.spots
+    pub(crate) fn on_screen(&self) -> &[Option<OnScreen>] {
+        &self.on_screen
     }
 
     /// Width and height in fine pixels.
@@ -144,48 +145,15 @@ impl Retained {
     /// The fragments that some triangles have in some squares: for each draw of the mesh the number of each triangle in the
     /// draw, and its vertices. Only triangles that may be seen in these squares need be given.
     pub(crate) fn cover(&self, draws: &[Vec<(u32, [u32; 3])>], squares: &Squares) -> Coverage {
-        let mut triangles = Vec::new();
-        let mut ends = Vec::new();
-        let mut blended = Vec::new();
-        for (number, draw) in draws.iter().enumerate() {
-            let state = state_of(&self.states, number);
-            let first = triangles.len();
-            triangles.extend(draw.iter().filter_map(|(index, corners)| {
-                Triangle::new(*index, *corners, &self.vertices.positions, &self.target)
-                    .filter(|triangle| triangle.front || !state.front_only)
-            }));
-            ends.push(triangles.len());
-            if state.blend != Blend::Opaque {
-                blended.push(first..triangles.len());
-            }
-        }
-        let mut quads = if self.late {
-            quads::in_order(&triangles)
-        } else {
-            quads::visible(&triangles, &blended, &self.target)
-        };
-        quads.retain(|quad| quad.is_in(squares));
-        let quads = quads::by_draw(quads, &ends);
-        let blocks = quads::blocks(
-            &quads,
-            &triangles,
+        let draws = draws.iter().map(|draw| draw.iter().copied());
+        let positions = &self.vertices.positions;
+        let some = Triangles::of_draws(positions, draws, &self.target, &self.states);
+        some.cover(
             &self.vertices,
-            &self.outputs,
-            &self.inputs,
+            [&self.outputs, &self.inputs],
             &self.target,
-        );
-        let fragments = blocks.last().map_or(0, |b| b.first + b.covered_count());
-        Coverage {
-            width: self.target.width,
-            height: self.target.height,
-            grid: self.target.grid,
-            blocks,
-            fragments,
-            drawn: fragments,
-            slots: self.inputs.clone(),
-            late: self.late,
-            states: self.states.clone(),
-            vertex_profile: self.vertices.profile.clone(),
-        }
+            (self.late, &self.states),
+            |quad| quad.is_in(squares),
+        )
     }
 }
