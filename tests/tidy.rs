@@ -26,7 +26,8 @@ fn files() -> Vec<PathBuf> {
     }
     let mut found = Vec::new();
     for folder in [
-        ".ci", "benches", "examples", "machine", "mesh", "passes", "src", "testdata", "tests",
+        ".ci", "benches", "examples", "joint", "machine", "mesh", "passes", "src", "testdata",
+        "tests",
     ] {
         walk(&root().join(folder), &mut found);
     }
