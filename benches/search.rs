@@ -6,9 +6,10 @@
 use criterion::{Criterion, Throughput};
 use lodc::compile::normal_form;
 use lodc::eval::program::Program;
+use lodc::eval::programs::Stand;
 use lodc::front::Source;
 use lodc::scene::Scene;
-use lodc::search::{SampleSet, Samples, Stand, try_each};
+use lodc::search::{SampleSet, Samples, try_each};
 use lodc_passes::{Stage, recipe};
 use std::path::Path;
 use std::time::Duration;

@@ -7,9 +7,10 @@
 use lodc::compile::normal_form;
 use lodc::emit::Lock;
 use lodc::eval::program::{Program, Refused};
+use lodc::eval::programs::Stand;
 use lodc::front::Source;
 use lodc::scene::Scene;
-use lodc::search::{SampleSet, Samples, Stand};
+use lodc::search::{SampleSet, Samples};
 use lodc_passes::{Candidate, Shader, Stage, recipe};
 use std::error::Error;
 use std::path::Path;

@@ -7,9 +7,10 @@
 use super::clock::Timings;
 use super::search::Ready;
 use super::{Files, Request};
+use crate::eval::programs::Stand;
 use crate::eval::refusal;
 use crate::scene::chance::{child, unit};
-use crate::search::{SampleSet, Samples, Stand, trajectory};
+use crate::search::{SampleSet, Samples, trajectory};
 use crate::time::clock::Clock;
 use crate::time::model::{Calibration, Measurement};
 use crate::time::{Timing, TimingWarning};

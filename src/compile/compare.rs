@@ -10,6 +10,7 @@ use crate::emit::{figure, writable};
 use crate::error::ErrorFigures;
 use crate::eval::image::{encode_png, to_byte};
 use crate::eval::program::{Program, Refused};
+use crate::eval::programs::Stand;
 use crate::eval::refusal;
 use crate::front::Source;
 #[cfg(feature = "gpu")]
@@ -18,7 +19,7 @@ use crate::report::{ComparedAt, Comparison, Input};
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::search::drawn::{Compiled, Device};
-use crate::search::{Measured, OverBlack, SampleSet, Samples, Stand, threshold};
+use crate::search::{Measured, OverBlack, SampleSet, Samples, threshold};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod;
 use naga::back::pipeline_constants::process_overrides;

@@ -6,14 +6,14 @@ use crate::emit::{self, EmitLevel, Form, Lock, LockedGenerated, Output, figure};
 use crate::eval::draw::shade;
 use crate::eval::machine::MAX_ROUNDS;
 use crate::eval::program::{Program, Refused};
+use crate::eval::programs::Stand;
 use crate::eval::raster::rasterize;
 use crate::eval::refusal;
 use crate::front::Source;
 use crate::report::{Input, Origin, Report, TransitionReport};
 use crate::scene::{Reading, Scene};
 use crate::search::{
-    self, Found, Level, Progress, SampleSet, Samples, Stand, coordinates_per_pixel,
-    texels_per_pixel,
+    self, Found, Level, Progress, SampleSet, Samples, coordinates_per_pixel, texels_per_pixel,
 };
 use crate::time::clock::{Clock, worst_ratio};
 use crate::{Diagnostic, Result};

@@ -6,10 +6,11 @@ use super::search::{Ready, vertex_program};
 use crate::Result;
 use crate::emit::{self, EmitLevel, Output, Transition, figure};
 use crate::eval::program::Program;
+use crate::eval::programs::Stand;
 use crate::eval::refusal;
 use crate::report::{RatioReport, TransitionReport};
 use crate::scene::Scene;
-use crate::search::{Found, SampleSet, Samples, Stand};
+use crate::search::{Found, SampleSet, Samples};
 use crate::time::clock::worst;
 use lodc_passes::autolod;
 

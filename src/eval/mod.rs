@@ -12,6 +12,7 @@ pub mod draw;
 pub mod generated;
 pub mod image;
 pub mod parameters;
+pub mod programs;
 pub mod raster;
 mod refused;
 

@@ -7,8 +7,8 @@
 //! what one does is not done again by another. This is a step of Gauss and Newton on the measured error itself.
 
 use super::interval::Interval;
-use super::programs::Programs;
 use super::samples::{Measured, SampleSet};
+use crate::eval::programs::Programs;
 use lodc_passes::least_squares::LeastSquares;
 use lodc_passes::{Candidate, Shader, recipe};
 use rayon::prelude::*;
@@ -151,9 +151,10 @@ mod tests {
     use super::*;
     use crate::compile::normal_form;
     use crate::eval::program::Program;
+    use crate::eval::programs::Stand;
     use crate::front::Source;
     use crate::scene::Scene;
-    use crate::search::{Samples, Stand};
+    use crate::search::Samples;
 
     #[test]
     fn the_best_constant_leaves_less_error_than_the_mean() {

@@ -7,8 +7,9 @@
 //! their own; it hands over the same numbers, which is looked at, too, so that the search goes on with the original's.
 
 use super::kept::Kept;
-use super::samples::{Measured, SampleSet, Samples, Stand};
+use super::samples::{Measured, SampleSet, Samples};
 use crate::eval::program::{Program, Refused};
+use crate::eval::programs::Stand;
 use crate::eval::raster::hand_over_the_same;
 use lodc_passes::recipe::{self, Considered};
 use lodc_passes::texture_removal::TextureRemoval;

@@ -1,11 +1,11 @@
 //! Facts: what the samples of a scene show of the values of a shader, and what is known of its textures, at one
 //! distance.
 
-use super::programs::Programs;
 use super::samples::SampleSet;
 use crate::eval::draw::{Blend, Shading, shade_into, shade_weighed};
 use crate::eval::machine::{Probe, Profile};
 use crate::eval::program::{Opacity, Program};
+use crate::eval::programs::Programs;
 use crate::eval::raster::vertex_profile;
 use crate::eval::texture::{Dimension, Texture};
 use crate::scene::{Scene, Variation};
@@ -334,10 +334,11 @@ fn float_values(shader: &Shader, stage: Stage) -> Vec<Handle<Expression>> {
 mod tests {
     use super::*;
     use crate::compile::normal_form;
+    use crate::eval::programs::Stand;
     use crate::front::Source;
+    use crate::search::Samples;
     use crate::search::best::best;
     use crate::search::interval::Interval;
-    use crate::search::{Samples, Stand};
     use lodc_passes::recipe;
     use std::path::Path;
 

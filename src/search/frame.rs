@@ -1,7 +1,6 @@
 //! One frame of a sample set: rasterised once for every offset, with the reference's pixels beside it; and a frame as a
 //! picture, for people.
 
-use super::programs::Programs;
 use crate::error::{
     FrameError, GRID, Reference, Shown, TILE, Tally, colours, encoded, held, over_black,
     reference_of,
@@ -10,6 +9,7 @@ use crate::eval::draw::{Lit, Seen, Shading, seen, shade_into, shade_lit};
 use crate::eval::machine::{Bindings, Profile};
 use crate::eval::mix::Mix;
 use crate::eval::program::Program;
+use crate::eval::programs::Programs;
 use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::scene::{Output, Scene, chance::mix};
 use lodc_passes::{Fingerprint, Work};
@@ -393,9 +393,10 @@ fn choose(all: &[(u32, u32)], count: usize, seed: u64) -> BTreeSet<(u32, u32)> {
 mod tests {
     use crate::compile::normal_form;
     use crate::eval::program::Program;
+    use crate::eval::programs::Stand;
     use crate::front::Source;
     use crate::scene::Scene;
-    use crate::search::{SampleSet, Samples, Stand};
+    use crate::search::{SampleSet, Samples};
     use lodc_passes::{PASSES, Stage};
     use std::path::Path;
 

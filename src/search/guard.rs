@@ -6,11 +6,11 @@
 //! what spoils one highlight spoils the others.
 
 use super::kept::Kept;
-use super::programs::Programs;
-use super::samples::{Measured, SampleSet, Stand, Tiles};
+use super::samples::{Measured, SampleSet, Tiles};
 use crate::emit::shared_locations;
 use crate::error::Details;
 use crate::eval::program::Refused;
+use crate::eval::programs::{Programs, Stand};
 use crate::stability::Battery;
 use lodc_passes::Shader;
 

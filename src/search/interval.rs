@@ -1,8 +1,8 @@
 //! The samples at several distances of the interval in which a level is used.
 
-use super::programs::Programs;
-use super::samples::{Measured, SampleSet, Samples, Stand};
+use super::samples::{Measured, SampleSet, Samples};
 use crate::eval::program::Refused;
+use crate::eval::programs::{Programs, Stand};
 use lodc_passes::Shader;
 
 /// Sample sets from the start of an interval to its end, nearest first.

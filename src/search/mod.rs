@@ -26,8 +26,9 @@ mod interval;
 mod kept;
 pub mod levels;
 mod parameters;
-mod programs;
 pub mod samples;
+#[cfg(test)]
+mod tests;
 mod textures;
 mod timed;
 mod trajectory;
@@ -41,6 +42,5 @@ pub use kept::Kept;
 pub(crate) use kept::is_within;
 pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, Struck, find};
-pub use programs::Programs;
-pub use samples::{Measured, OverBlack, SampleSet, Samples, Stand};
+pub use samples::{Measured, OverBlack, SampleSet, Samples};
 pub use trajectory::{Step, trajectory};

@@ -2,13 +2,13 @@
 //! the reference beside them. A variant is then one run of its fragment program.
 
 use super::frame::{Executed, Part, Pen, Rasterised, shown};
-use super::programs::{self, Programs};
 use crate::error::{Details, ErrorFigures, ErrorSum};
 use crate::eval::generated::Baked;
 use crate::eval::program::{Program, Refused};
+use crate::eval::programs::{self, Programs, Stand};
 use crate::eval::raster::{Frame, Shape, shape};
 use crate::scene::{
-    Scene, SceneLighting, Split,
+    SceneLighting, Split,
     chance::{child, unit},
 };
 use crate::time::model::{Extent, Features, Invocation};
@@ -33,17 +33,6 @@ const LEAST_BOUND: f64 = 1e-6;
 
 /// A tile that uses up less than this part of its squared error is not close to its bound.
 const CLOSE: f64 = 0.5;
-
-/// What a search stands on.
-pub struct Stand<'a> {
-    /// The original in normal form.
-    pub base: &'a Shader,
-    /// The vertex program that every variant is drawn with.
-    pub vertex: &'a Program,
-    /// What errors are measured over. With another mesh in the scene, sets of it measure the same shaders on that: what a
-    /// level with values at the vertices adds on a finer one, or, by [`SampleSet::of_two`], against the first mesh's pictures.
-    pub scene: &'a Scene,
-}
 
 /// Which samples of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -555,6 +544,7 @@ mod tests {
     use crate::compile::normal_form;
     use crate::eval::mix::{Class, Mix};
     use crate::front::Source;
+    use crate::scene::Scene;
     use lodc_passes::Stage;
     use std::path::Path;
 

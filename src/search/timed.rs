@@ -294,9 +294,10 @@ mod tests {
     use super::*;
     use crate::compile::normal_form;
     use crate::eval::program::Program;
+    use crate::eval::programs::Stand;
     use crate::front::Source;
     use crate::scene::Scene;
-    use crate::search::{Found, Kept, Scope, Stand, find};
+    use crate::search::{Found, Kept, Scope, find};
     use lodc_passes::Stage;
     use lodc_passes::cost::of_function;
     use std::path::Path;

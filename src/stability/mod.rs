@@ -23,10 +23,10 @@ pub use blame::{Blamed, Number};
 pub use run::Failure;
 
 use crate::eval::program::Refused;
+use crate::eval::programs::{Programs, Stand};
 use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::eval::rough::Arithmetic;
 use crate::scene::Split;
-use crate::search::{Programs, Stand};
 use inputs::{Group, Interface};
 use lodc_passes::{Recipe, Shader, Stage};
 use rayon::prelude::*;
