@@ -2,6 +2,8 @@
 //!
 //! A file of `testdata/stability` is a shader whose second line says what is done to it, `// trap: pass path choice` or
 //! `// innocent: ...`, a step after the other with ` then ` between them. What is said of a trap is beside it, `.says`.
+//! `// stiff: ...` and `// smooth: ...` are the same of jumps and slopes, which fail nothing; without a step it is the original
+//! that is looked at.
 #![cfg(feature = "search")]
 
 mod fixtures;
@@ -13,14 +15,23 @@ use lodc::eval::programs::Stand;
 use lodc::front::Source;
 use lodc::scene::Scene;
 use lodc::search::{SampleSet, Samples};
-use lodc::stability::{Battery, Verdict};
+use lodc::stability::{Battery, Verdict, Ways};
 use lodc_passes::{Recipe, Stage, all_passes, recipe};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// What a shader is an example of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Trap,
+    Innocent,
+    Stiff,
+    Smooth,
+}
+
 /// What is done to a shader, by its second line.
 struct Case {
-    is_trap: bool,
+    kind: Kind,
     steps: Vec<String>,
 }
 
@@ -28,17 +39,23 @@ fn case(text: &str) -> Case {
     let line = text.lines().nth(1).unwrap_or_default();
     let (kind, steps) = line.split_once(": ").expect("it says what is done");
     Case {
-        is_trap: match kind {
-            "// trap" => true,
-            "// innocent" => false,
+        kind: match kind {
+            "// trap" => Kind::Trap,
+            "// innocent" => Kind::Innocent,
+            "// stiff" => Kind::Stiff,
+            "// smooth" => Kind::Smooth,
             other => panic!("{other}"),
         },
-        steps: steps.split(" then ").map(str::to_owned).collect(),
+        steps: steps
+            .split(" then ")
+            .filter(|step| *step != "nothing")
+            .map(str::to_owned)
+            .collect(),
     }
 }
 
-/// How the shader of a file stands after its steps, and what is said of it.
-fn judged(path: &Path) -> Result<(bool, Verdict, String), String> {
+/// Whether something is found of the shader of a file after its steps, and what is said of it.
+fn judged(path: &Path) -> Result<(Kind, bool, String), String> {
     let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
     let scene_file = path.with_extension("toml");
     let scene = Scene::read(&source, Some(&*scene_file).filter(|file| file.is_file()));
@@ -54,12 +71,15 @@ fn judged(path: &Path) -> Result<(bool, Verdict, String), String> {
         vertex: &vertex,
         scene: &scene,
     };
-    let set = SampleSet::new(&stand, scene.nearest, Samples::Search).expect("it runs");
     let case = case(&source.text);
+    // Only steps ask for facts.
+    let steps_asked = !case.steps.is_empty();
+    let set = steps_asked.then(|| SampleSet::new(&stand, scene.nearest, Samples::Search));
+    let set = set.transpose().expect("it runs");
     let mut made = base.clone();
     let mut steps = Vec::new();
     for wanted in &case.steps {
-        let facts = set.facts(&made);
+        let facts = set.as_ref().map(|set| set.facts(&made)).unwrap_or_default();
         let offered: Vec<_> = all_passes()
             .flat_map(|pass| pass.candidates(&made, &facts))
             .collect();
@@ -72,6 +92,22 @@ fn judged(path: &Path) -> Result<(bool, Verdict, String), String> {
         };
         made = recipe::apply(&made, step).expect("it was offered");
         steps.push(step.clone());
+    }
+    if let Kind::Stiff | Kind::Smooth = case.kind {
+        let ways = Ways::new(&stand).expect("it runs");
+        let found = match steps.is_empty() {
+            true => ways.of_original(),
+            false => {
+                let compared = ways.compare((&base, &Recipe(steps)), &made);
+                compared.expect("it runs")
+            }
+        };
+        let says = found.iter().map(|stiff| {
+            let whole = stiff.diagnostic(&base, &source).render(false);
+            format!("{}\n{whole}", stiff.says(&source))
+        });
+        let says: Vec<String> = says.collect();
+        return Ok((case.kind, !says.is_empty(), says.join("\n")));
     }
     let battery = Battery::new(&stand).expect("it runs");
     let mut judged = battery.judge(&made).expect("it runs");
@@ -86,38 +122,41 @@ fn judged(path: &Path) -> Result<(bool, Verdict, String), String> {
             blamed.diagnostic(&base, &source).render(false)
         )
     });
-    Ok((case.is_trap, judged.verdict, says.unwrap_or_default()))
+    let is_found = judged.verdict == Verdict::Unstable;
+    Ok((case.kind, is_found, says.unwrap_or_default()))
 }
 
 #[test]
 fn traps_are_found_with_their_lines_and_innocents_are_not_flagged() {
     let mut goldens = Goldens::of("stability");
-    let mut counts = [0, 0];
+    let mut counts = [0; 4];
     for path in fixtures::shaders("testdata/stability") {
         let path = path
             .strip_prefix(env!("CARGO_MANIFEST_DIR"))
             .expect("it is there");
         let name = path.display();
-        let (is_trap, verdict, says) = match judged(path) {
+        let (kind, is_found, says) = match judged(path) {
             Ok(judged) => judged,
             Err(wrong) => {
                 goldens.wrong(format!("{name}: {wrong}"));
                 continue;
             }
         };
-        counts[usize::from(!is_trap)] += 1;
-        match (is_trap, verdict) {
-            (true, Verdict::Unstable) => {
+        counts[kind as usize] += 1;
+        match (matches!(kind, Kind::Trap | Kind::Stiff), is_found) {
+            (true, true) => {
                 let file = path.with_extension("says");
                 goldens.compare(&name.to_string(), &file, &says);
             }
-            (true, _) => goldens.wrong(format!("{name} is not found")),
-            (false, Verdict::Unstable) => goldens.wrong(format!("{name} is flagged:\n{says}")),
-            (false, _) => {}
+            (true, false) => goldens.wrong(format!("{name} is not found")),
+            (false, true) => goldens.wrong(format!("{name} is flagged:\n{says}")),
+            (false, false) => {}
         }
     }
     goldens.finish();
-    assert!(counts[0] >= 12 && counts[1] >= 12, "{counts:?}");
+    let [traps, innocents, stiff, smooth] = counts;
+    assert!(traps >= 12 && innocents >= 12, "{counts:?}");
+    assert!(stiff >= 8 && smooth >= 4, "{counts:?}");
 }
 
 /// A trap in the folder of a test, with a scene that is quick to search.

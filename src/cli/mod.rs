@@ -678,7 +678,8 @@ fn stability(arguments: StabilityArgs) -> Result<ExitCode> {
         record: arguments.record,
     };
     let found = compile::stability(&asked)?;
-    for diagnostic in found.warnings.iter().chain(&found.findings) {
+    let findings = found.stiff.iter().chain(&found.findings);
+    for diagnostic in found.warnings.iter().chain(findings) {
         print_diagnostic(diagnostic);
     }
     print(&found.table());

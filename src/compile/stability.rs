@@ -4,7 +4,7 @@ use super::Request;
 use super::search::Ready;
 use crate::emit::Lock;
 use crate::eval::refusal;
-use crate::stability::{Battery, Blamed, Judged, Reach, Verdict};
+use crate::stability::{Battery, Blamed, Judged, Reach, Stiff, Verdict, Ways};
 use crate::{Diagnostic, Result};
 use lodc_passes::Recipe;
 use std::fmt::Write;
@@ -30,6 +30,8 @@ pub struct Stability {
     pub levels: Vec<(f32, Judged)>,
     /// What was found, in the user's source.
     pub findings: Vec<Box<Diagnostic>>,
+    /// What is stiff in the original, and what becomes of that in each level: nothing fails for it.
+    pub stiff: Vec<Box<Diagnostic>>,
     /// What should be known besides.
     pub warnings: Vec<Box<Diagnostic>>,
     /// What is to be written.
@@ -73,6 +75,9 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
     let lint = battery.lint();
     let diagnostic = |blamed: &Blamed| blamed.diagnostic(&ready.base, &ready.source);
     let mut findings: Vec<Box<Diagnostic>> = lint.iter().map(|(b, _)| diagnostic(b)).collect();
+    let ways = Ways::new(&stand).map_err(refused)?;
+    let stiffness = |stiff: &Stiff| stiff.diagnostic(&ready.base, &ready.source);
+    let mut stiff: Vec<Box<Diagnostic>> = ways.of_original().iter().map(stiffness).collect();
     let mut worst: Vec<_> = lint.into_iter().map(|(_, failure)| failure).collect();
     let mut levels = Vec::new();
     if request.lock().is_file() {
@@ -93,6 +98,12 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
                 findings.push(diagnostic(&blamed));
                 worst.push(failure.clone());
             }
+            let changed = ways.compare((&ready.base, &whole), &emitted.shader);
+            for changed in changed.map_err(refused)? {
+                let found = stiffness(&changed);
+                let note = format!("from autoLOD {} on", level.autolod);
+                stiff.push(found.with_note(note));
+            }
             levels.push((level.autolod, judged));
         }
     }
@@ -104,6 +115,7 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
         original,
         levels,
         findings,
+        stiff,
         warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),
         files,
     })

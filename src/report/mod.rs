@@ -396,6 +396,8 @@ pub struct StabilityReport {
     pub inputs: Option<u64>,
     /// The worst places.
     pub worst: Vec<String>,
+    /// Jumps and slopes that are added, moved, steeper or gone, which refuse nothing.
+    pub stiff: Vec<String>,
 }
 
 /// A non-dominated variant at a distance.
@@ -571,6 +573,9 @@ fn level_report(
             inputs: level.stability.as_ref().map(|judged| judged.inputs),
             worst: (level.unstable.iter())
                 .map(|blamed| blamed.says(base, source))
+                .collect(),
+            stiff: (level.stiff.iter())
+                .map(|stiff| stiff.says(source))
                 .collect(),
         },
     }

@@ -259,6 +259,7 @@ impl<'a> Checks<'a> {
         Some(Level {
             stability,
             unstable: Vec::new(),
+            stiff: Vec::new(),
             autolod: threshold(self.stand.scene, distance),
             distance,
             is_original: false,

@@ -20,7 +20,7 @@ use crate::error::{ErrorFigures, HeldOut};
 use crate::eval::program::Refused;
 use crate::eval::programs::Stand;
 use crate::scene::{Scene, Split};
-use crate::stability::{Battery, Blamed, Judged};
+use crate::stability::{Battery, Blamed, Judged, Stiff, Ways};
 use crate::time::clock::{Clock, is_faster, worst_ratio};
 use crate::time::{Timing, Verdict};
 use lodc_passes::{Recipe, Shader, Used};
@@ -69,6 +69,8 @@ pub struct Level {
     pub stability: Option<Judged>,
     /// Why it is unstable, where it is and that is allowed.
     pub unstable: Vec<Blamed>,
+    /// Jumps and slopes that it has and the original has not, or has elsewhere, and those that are gone.
+    pub stiff: Vec<Stiff>,
     /// For each step of the recipe, the RMSE after it, over the samples that the search looked at.
     pub error_after: Vec<f64>,
 }
@@ -94,6 +96,7 @@ impl Level {
             with_textures: None,
             stability: None,
             unstable: Vec::new(),
+            stiff: Vec::new(),
             error_after: Vec::new(),
         }
     }
@@ -490,8 +493,13 @@ pub fn find(
         });
     }
     let mut levels = chain.levels;
+    let ways = Ways::new(stand)?;
     for level in &mut levels {
         stand_of(&whole, &exact, level)?;
+        if !level.is_original {
+            let recipe = derivation(&exact, level);
+            level.stiff = ways.compare((stand.base, &recipe), &level.shader)?;
+        }
     }
     Ok(Found {
         exact,
@@ -504,6 +512,12 @@ pub fn find(
     })
 }
 
+/// How a level is made from the original.
+fn derivation(exact: &Exact, level: &Level) -> Recipe {
+    let steps = exact.recipe.0.iter().chain(&level.recipe.0);
+    Recipe(steps.cloned().collect())
+}
+
 /// Says how a level stands that was not asked.
 fn stand_of(battery: &Battery<'_>, exact: &Exact, level: &mut Level) -> Result<(), Refused> {
     if level.is_original {
@@ -513,8 +527,7 @@ fn stand_of(battery: &Battery<'_>, exact: &Exact, level: &mut Level) -> Result<(
         if judged.failures.is_empty() {
             battery.hunt_into(&level.shader, &mut judged)?;
         }
-        let steps = exact.recipe.0.iter().chain(&level.recipe.0);
-        let recipe = Recipe(steps.cloned().collect());
+        let recipe = derivation(exact, level);
         let first = judged.failures.first();
         let blamed = first.map(|failure| battery.blame((battery.base(), &recipe), failure));
         level.unstable.extend(blamed);

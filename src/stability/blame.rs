@@ -260,7 +260,7 @@ impl Battery<'_> {
 }
 
 /// The inputs of a fragment stage by location, with their names.
-fn names(shader: &Shader) -> Vec<(u32, String)> {
+pub(super) fn names(shader: &Shader) -> Vec<(u32, String)> {
     let Some(function) = shader.function(Stage::Fragment) else {
         return Vec::new();
     };
@@ -287,7 +287,7 @@ fn handle_of(shader: &Shader, path: &str) -> Option<Handle<Expression>> {
     all.find(|value| shader.id(Stage::Fragment, *value).path() == path)
 }
 
-fn span_of(shader: &Shader, stage: Stage, value: Handle<Expression>) -> Span {
+pub(super) fn span_of(shader: &Shader, stage: Stage, value: Handle<Expression>) -> Span {
     let function = shader.function(stage);
     function.map_or(Span::UNDEFINED, |function| {
         function.expressions.get_span(value)
@@ -411,7 +411,7 @@ impl Blamed {
 }
 
 impl Number {
-    fn says(&self) -> String {
+    pub(super) fn says(&self) -> String {
         let numbers = self.values.iter().map(|x| format!("{:?}", *x as f32));
         let numbers: Vec<String> = numbers.collect();
         match &numbers[..] {

@@ -49,6 +49,33 @@ pub(crate) struct Group {
     pub(crate) quads: Vec<Quad>,
 }
 
+impl Quad {
+    /// A small one at a place of a triangle: what its second and third corner weigh.
+    fn at(corners: [Corner; 3], at: [f64; 2]) -> Self {
+        let weights = [0.0, 1.0, 2.0, 3.0].map(|j: f64| {
+            let (b, c) = (at[0] + (j % 2.0) * SMALL, at[1] + (j / 2.0).floor() * SMALL);
+            [1.0 - b - c, b, c]
+        });
+        Self { corners, weights }
+    }
+}
+
+/// A way from the quads of one group to those of another.
+pub(crate) struct Way {
+    /// Whether its triangles are wider than the mesh's.
+    pub(crate) is_wide: bool,
+    /// Where it begins and where it ends: the same triangles, with other uniforms or at other places.
+    pub(crate) ends: [Group; 2],
+}
+
+/// Groups of ways across triangles of the mesh, and as many across wider ones.
+const CROSSED: usize = 4;
+/// Groups of ways of a uniform, and quads in each: each of their places needs a run of its own.
+const TURNED: usize = 8;
+const TURNED_QUADS: usize = 4;
+/// The extent of a small quad, as a share of its triangle.
+const SMALL: f64 = 1e-3;
+
 /// What a shader's declared inputs are made from.
 pub(crate) struct Interface<'a> {
     scene: &'a Scene,
@@ -87,6 +114,78 @@ impl<'a> Interface<'a> {
             freedoms: scene.freedoms(),
             seed,
         }
+    }
+
+    /// Ways through the inputs, each from the quads of one group to those of another, in their order.
+    ///
+    /// First come ways across triangles of the mesh, then across triangles between any three of its vertices, a quarter of
+    /// them far from where texture coordinates are small; then, for each uniform that may be several things, ways on which
+    /// that changes and nothing else.
+    pub(crate) fn ways(&self) -> Vec<Way> {
+        let mut ways = Vec::new();
+        for number in 0..2 * CROSSED {
+            let seed = child(self.seed, 1_000_000 + number as u64);
+            let is_wide = number >= CROSSED;
+            let mut begin = Group {
+                picture: mix(seed) as usize % self.pictures.len().max(1),
+                values: Vec::new(),
+                quads: Vec::new(),
+            };
+            let mut end = begin.clone();
+            for quad in 0..QUADS as u64 {
+                let seed = child(seed, 100 + quad);
+                let mut corners = self.corners(seed);
+                if is_wide {
+                    for (c, corner) in corners.iter_mut().enumerate() {
+                        [*corner, ..] = self.corners(child(seed, c as u64));
+                        if quad % 4 == 0 {
+                            corner[UV] += 1e6;
+                            corner[UV + 1] -= 1e6;
+                        }
+                    }
+                }
+                begin.quads.push(Quad::at(corners, [0.0, 0.0]));
+                end.quads.push(Quad::at(corners, [1.0, 0.0]));
+            }
+            ways.push(Way {
+                is_wide,
+                ends: [begin, end],
+            });
+        }
+        for (number, freedom) in self.freedoms.iter().enumerate() {
+            let seed = child(self.seed, 2_000_000 + number as u64);
+            // The ends of a range, 0 and 1; a light that turns from the eye; a week.
+            let [low, high] = match freedom.semantic {
+                Some(Semantic::LightDirection) => [1, 3],
+                Some(Semantic::Time) | None => [1, 2],
+                Some(_) => continue,
+            };
+            if self.choices(freedom) <= high || ways.len() >= 2 * CROSSED + TURNED {
+                continue;
+            }
+            let picture = mix(seed) as usize % self.pictures.len().max(1);
+            let all = (0..TURNED_QUADS as u64).map(|quad| self.corners(child(seed, quad)));
+            let all: Vec<[Corner; 3]> = all.collect();
+            let third = 1.0 / 3.0;
+            let group = |choice: usize| {
+                let value = self.value(freedom, choice, picture, all.first()?)?;
+                let quads = all.iter().map(|corners| Quad::at(*corners, [third, third]));
+                Some(Group {
+                    picture,
+                    values: vec![(freedom.path().to_owned(), value)],
+                    quads: quads.collect(),
+                })
+            };
+            if let (Some(begin), Some(end)) = (group(low), group(high))
+                && begin != end
+            {
+                ways.push(Way {
+                    is_wide: false,
+                    ends: [begin, end],
+                });
+            }
+        }
+        ways
     }
 
     /// The frame of a group: its picture with its uniforms, and a mesh of its triangles.
@@ -135,7 +234,7 @@ impl<'a> Interface<'a> {
     pub(crate) fn declared(&self, count: usize) -> Vec<Group> {
         let choices: Vec<usize> = self.freedoms.iter().map(|f| self.choices(f)).collect();
         let mut uniforms = Pairs::new(choices, child(self.seed, 1));
-        let dimensions = Way::DIMENSIONS.to_vec();
+        let dimensions = Bend::DIMENSIONS.to_vec();
         let mut quads = Pairs::new(dimensions, child(self.seed, 2));
         let all = (0..count).map(|number| {
             let seed = child(self.seed, 3 + number as u64);
@@ -160,8 +259,8 @@ impl<'a> Interface<'a> {
                     0 => first,
                     _ => self.corners(child(seed, 100 + quad as u64)),
                 };
-                let way = Way(quads.next());
-                group.quads.push(way.quad(corners, &towards));
+                let bend = Bend(quads.next());
+                group.quads.push(bend.quad(corners, &towards));
             }
             group
         });
@@ -445,9 +544,9 @@ struct Towards {
 }
 
 /// What is done to a triangle and where on it a quad is: a choice for each dimension, 0 for none.
-struct Way(Vec<usize>);
+struct Bend(Vec<usize>);
 
-impl Way {
+impl Bend {
     /// Positions, normals, texture coordinates, tangents, colours, place, extent.
     const DIMENSIONS: [usize; 7] = [4, 12, 7, 5, 4, 7, 4];
 
@@ -611,13 +710,13 @@ mod tests {
 
     #[test]
     fn every_pair_of_choices_is_met_soon() {
-        let mut pairs = Pairs::new(Way::DIMENSIONS.to_vec(), 5);
+        let mut pairs = Pairs::new(Bend::DIMENSIONS.to_vec(), 5);
         for _ in 0..12 * QUADS {
             pairs.next();
         }
         let all: usize = (0..7)
             .flat_map(|i| (i + 1..7).map(move |j| (i, j)))
-            .map(|(i, j)| Way::DIMENSIONS[i] * Way::DIMENSIONS[j])
+            .map(|(i, j)| Bend::DIMENSIONS[i] * Bend::DIMENSIONS[j])
             .sum();
         assert_eq!(pairs.met.len(), all);
     }

@@ -18,9 +18,11 @@ mod hunt;
 mod inputs;
 mod obligations;
 mod run;
+mod stiff;
 
 pub use blame::{Blamed, Number};
 pub use run::Failure;
+pub use stiff::{Change, Stiff, Ways};
 
 use crate::eval::program::Refused;
 use crate::eval::programs::{Programs, Stand};

@@ -1,0 +1,14 @@
+// An edge between colours that look the same.
+// smooth: nothing
+
+struct Varyings {
+    @location(0) uv: vec2f,
+    @location(1) world_normal: vec3f,
+    @location(2) world_position: vec3f,
+}
+
+@fragment
+fn fs_main(in: Varyings) -> @location(0) vec4f {
+    let band = step(0.4, in.uv.x);
+    return vec4f(vec3f(0.5 + 0.01 * band), 1.0);
+}
