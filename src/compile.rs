@@ -13,6 +13,8 @@ mod compare;
 mod directives;
 #[cfg(feature = "search")]
 mod init;
+#[cfg(feature = "mesh")]
+mod joint;
 #[cfg(feature = "search")]
 mod kept;
 #[cfg(feature = "mesh")]
@@ -66,6 +68,32 @@ use std::path::{Path, PathBuf};
 /// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
 /// The largest shader that was seen has 15,537.
 pub const EXPRESSION_LIMIT: usize = 100_000;
+
+/// How levels are searched.
+#[cfg(feature = "mesh")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Strategy {
+    /// Shaders alone, on the scene's mesh.
+    #[default]
+    Greedy,
+    /// Meshes with shaders: both by themselves, then pairs of them along the boundary of what is within the bound.
+    Separate,
+    /// The same, and of each distance all pairs.
+    Exhaustive,
+}
+
+#[cfg(feature = "mesh")]
+impl Strategy {
+    /// Its name on the command line and in the report.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Greedy => "greedy",
+            Self::Separate => "separate",
+            Self::Exhaustive => "exhaustive",
+        }
+    }
+}
 
 /// Where run times come from.
 #[cfg(feature = "search")]
@@ -140,6 +168,19 @@ pub struct Request {
     pub band: Option<f32>,
     /// Whether each pixel chooses its level, by its texture coordinates.
     pub per_pixel: bool,
+    /// How levels are searched.
+    #[cfg(feature = "mesh")]
+    pub search: Strategy,
+    /// Of a joint search, how many meshes there are to choose from at most, with the original; by default 16.
+    #[cfg(feature = "mesh")]
+    pub meshes: Option<usize>,
+    /// The same of shaders; by default 24.
+    #[cfg(feature = "mesh")]
+    pub shaders: Option<usize>,
+    /// From how many sides meshes are seen while they are simplified, at least; by default as
+    /// [`crate::mesh::Settings::views`] has it.
+    #[cfg(feature = "mesh")]
+    pub mesh_views: Option<usize>,
     /// Which shaders are made exact first.
     #[cfg(feature = "search")]
     pub exact: crate::search::Scope,
@@ -367,7 +408,11 @@ fn read_lock(request: &Request) -> Result<Relocked> {
         }
     }
     let mut warnings = Vec::new();
-    for (what, file) in [("scene", &lock.scene), ("lighting shader", &lock.lighting)] {
+    for (what, file) in [
+        ("scene", &lock.scene),
+        ("lighting shader", &lock.lighting),
+        ("file of meshes", &lock.meshes),
+    ] {
         if let Some(file) = file
             && changed(&file.file, &file.hash)
         {

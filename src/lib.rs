@@ -23,6 +23,8 @@ pub mod eval;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 #[cfg(feature = "mesh")]
+pub mod joint;
+#[cfg(feature = "mesh")]
 pub mod mesh;
 #[cfg(feature = "search")]
 pub mod report;

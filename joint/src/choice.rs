@@ -24,11 +24,11 @@ pub struct Prices {
 }
 
 impl Default for Prices {
-    /// A transition that shows a hundredth is worth 1 % of the original's time, and any switch 2 %.
+    /// A transition that shows 0.04 is worth 1 % of the original's time, and any switch as much.
     fn default() -> Self {
         Self {
-            transition: 1.0,
-            switch: 0.02,
+            transition: 0.25,
+            switch: 0.01,
         }
     }
 }
@@ -263,7 +263,10 @@ mod tests {
                 vec![true, true, false],
                 vec![true, true, true],
             ],
-            prices: Prices::default(),
+            prices: Prices {
+                transition: 1.0,
+                switch: 0.02,
+            },
         };
         assert_eq!(choice.fastest(), Some(vec![0, 1, 1, 2]));
         assert_eq!(

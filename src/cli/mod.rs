@@ -256,7 +256,16 @@ struct CompileArgs {
     /// time=1,memory=0.2 [default: the scene's, else time]
     #[arg(long, value_name = "GOAL")]
     goal: Option<Goal>,
-    /// The passes that may cost error, such as texture-removal [default: all]
+    /// How levels are searched: shaders alone, or meshes with shaders, of which separate looks at pairs along the boundary of what is
+    /// within the bound, and exhaustive at all [default: greedy]
+    #[cfg(feature = "mesh")]
+    #[arg(long, value_enum)]
+    search: Option<compile::Strategy>,
+    #[cfg(feature = "mesh")]
+    #[command(flatten)]
+    joint: JointArgs,
+    /// The passes that may cost error, such as texture-removal [default: all]; with a search of meshes and shaders also mesh, for
+    /// simpler meshes alone, and shader
     #[arg(long, value_delimiter = ',', value_name = "PASSES")]
     only: Vec<String>,
     /// Leaves out of the levels what the scene does not need, before anything that costs error
@@ -299,6 +308,46 @@ struct CompileArgs {
     /// Prints nothing but errors
     #[arg(short, long)]
     quiet: bool,
+}
+
+/// How much a search of meshes and shaders looks at.
+#[cfg(feature = "mesh")]
+#[derive(Debug, Args)]
+struct JointArgs {
+    /// How many meshes a search of meshes and shaders chooses from, with the original [default: 16]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=500))]
+    meshes: Option<u32>,
+    /// How many shaders it chooses from, with the original [default: 24]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=500))]
+    shaders: Option<u32>,
+    /// From how many sides meshes are seen while they are simplified [default: 60]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=256))]
+    mesh_views: Option<u32>,
+}
+
+#[cfg(feature = "mesh")]
+impl JointArgs {
+    /// Adds to a request what was asked.
+    fn ask(self, search: Option<compile::Strategy>, request: &mut Request) -> Result<()> {
+        request.search = search.unwrap_or_default();
+        let given = [
+            ("--meshes", self.meshes),
+            ("--shaders", self.shaders),
+            ("--mesh-views", self.mesh_views),
+        ];
+        let given = given.into_iter().find(|(_, given)| given.is_some());
+        if let (compile::Strategy::Greedy, Some((flag, _))) = (request.search, given) {
+            return Err(Diagnostic::error(format!(
+                "`{flag}` is about a search of meshes and shaders"
+            ))
+            .with_note("add `--search separate`"));
+        }
+        let count = |count: Option<u32>| count.map(|count| count as usize);
+        request.meshes = count(self.meshes);
+        request.shaders = count(self.shaders);
+        request.mesh_views = count(self.mesh_views);
+        Ok(())
+    }
 }
 
 /// Where run times come from.
@@ -719,6 +768,8 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.unstable = arguments.allow_unstable;
     request.goal = arguments.goal;
     request.only = arguments.only;
+    #[cfg(feature = "mesh")]
+    arguments.joint.ask(arguments.search, &mut request)?;
     request.command = command_line();
     request.model = arguments.time.model.clone();
     request.time = arguments.time.run_time()?;

@@ -18,12 +18,17 @@ impl Ready {
     /// When a name is none of these or names no pass, and as [`Self::directives`].
     pub(super) fn kept(&self, request: &Request) -> Result<Kept> {
         let mut kept = Kept {
-            only: passes(&request.only)?,
+            only: passes(&named(request))?,
             unstable: request.unstable,
             same_vertex_stage: request.per_pixel,
             apart: request.transition.unwrap_or_default() != Transition::Pop,
             ..Kept::default()
         };
+        #[cfg(feature = "mesh")]
+        if request.is_of_meshes_alone() {
+            // No pass is called so.
+            kept.only.insert(super::joint::MESH.to_owned());
+        }
         let read = self.read_names();
         for name in &request.keep {
             let variables = self.source.module.global_variables.iter();
@@ -108,6 +113,23 @@ impl Ready {
             false => format!("did you mean {}?", near.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
         })
     }
+}
+
+/// What `--only` names of passes.
+#[cfg(not(feature = "mesh"))]
+fn named(request: &Request) -> Vec<String> {
+    request.only.clone()
+}
+
+/// What `--only` names of passes: of a joint search, not that meshes or shaders are meant.
+#[cfg(feature = "mesh")]
+fn named(request: &Request) -> Vec<String> {
+    use super::Strategy;
+    use super::joint::{MESH, SHADER};
+    let is_pass = |name: &&String| {
+        request.search == Strategy::Greedy || ![MESH, SHADER].contains(&name.as_str())
+    };
+    request.only.iter().filter(is_pass).cloned().collect()
 }
 
 /// The passes of these names.

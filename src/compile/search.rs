@@ -1,6 +1,8 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
 use super::clock::Timings;
+#[cfg(feature = "mesh")]
+use super::joint;
 use super::{Files, Request, normal_form, relative, textures};
 use crate::emit::{self, EmitLevel, Form, Lock, LockedGenerated, Output, figure};
 use crate::eval::draw::shade;
@@ -221,6 +223,8 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         },
         ..Output::default()
     });
+    #[cfg(feature = "mesh")]
+    ready.may_join(request)?;
     let trial = request.emitted((&ready.source, &ready.base), &[], emission)?;
     request.spare(&trial, &inputs)?;
     emit::writable(&trial)?;
@@ -234,14 +238,25 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
     let mut found = search::find(&stand, (request.exact, &kept), clock, progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
+    #[cfg(feature = "mesh")]
+    let joint = ready.join(request, &vertex, &found, &kept)?;
+    #[cfg(feature = "mesh")]
+    if let Some(joint) = &joint {
+        found.levels = joint.levels.iter().map(|of| of.level.clone()).collect();
+    }
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
-    let written = found.written();
-    let levels: Vec<EmitLevel> = written
-        .map(|(at, level)| emit_level(level, &says[at]))
+    // What is emitted: with meshes, levels that have new ones alone are not.
+    #[cfg(feature = "mesh")]
+    let of_shaders = joint.as_ref().map(|_| joint::of_shaders(&found));
+    #[cfg(not(feature = "mesh"))]
+    let of_shaders: Option<Found> = None;
+    let emitted = of_shaders.as_ref().unwrap_or(&found);
+    let levels: Vec<EmitLevel> = (emitted.written())
+        .map(|(_, level)| emit_level(level, &ready.says(level)))
         .collect();
 
     let mut files = request.emitted((&ready.source, &ready.base), &levels, emission)?;
-    let transitions = ready.transitions(&vertex, &found, &levels, emission, watch.as_mut())?;
+    let transitions = ready.transitions(&vertex, emitted, &levels, emission, watch.as_mut())?;
     let mut of_time: Vec<Box<Diagnostic>> = untimed.into_iter().collect();
     if let Some(watch) = &mut watch {
         watch.branches(&ready.base, &mut found.levels, &levels);
@@ -253,10 +268,27 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let made = textures::make(&ready.scene, &textures)?;
     let generated: Vec<LockedGenerated> = made.iter().map(|made| made.locked.clone()).collect();
     files.extend(request.texture_files(made));
-    let lock = Lock {
+    #[cfg_attr(not(feature = "mesh"), allow(unused_mut))]
+    let mut lock = Lock {
         generated: generated.clone(),
-        ..ready.lock((request, emission), &found, &levels, &transitions)
+        ..ready.lock(
+            (request, emission),
+            of_shaders.as_ref().unwrap_or(&found),
+            &levels,
+            &transitions,
+        )
     };
+    #[cfg(feature = "mesh")]
+    let meshes = match &joint {
+        Some(joint) => ready.meshes(request, joint)?,
+        None => joint::Meshes::default(),
+    };
+    #[cfg(feature = "mesh")]
+    {
+        files.extend(meshes.files);
+        lock.meshes = meshes.locked;
+        lock.mesh = meshes.levels;
+    }
     files.push((request.lock(), lock.to_toml().into_bytes()));
     let mut origin = Origin {
         generated,
@@ -276,6 +308,12 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         .warnings
         .extend(visible.iter().map(|w| w.message.clone()));
     origin.transitions = transitions;
+    #[cfg(feature = "mesh")]
+    {
+        origin.meshes = meshes.of_levels;
+        origin.shown = meshes.shown;
+        origin.joint = meshes.report;
+    }
     let report = Report::new(&found, &ready.base, &ready.source, &says, origin);
     files.push((request.beside("lod.json"), report.json().into_bytes()));
     request.spare(&files, &inputs)?;
@@ -444,7 +482,7 @@ impl Ready {
     }
 
     /// The path of a file that the scene names.
-    fn beside_scene(&self, file: &str) -> PathBuf {
+    pub(super) fn beside_scene(&self, file: &str) -> PathBuf {
         let scene = self.scene_file.as_ref().and_then(|scene| scene.parent());
         scene.unwrap_or(Path::new("")).join(file)
     }
@@ -465,8 +503,7 @@ impl Ready {
                 .map(|w| w.message.clone())
                 .collect(),
             inferences: self.inferred(),
-            transitions: Vec::new(),
-            generated: Vec::new(),
+            ..Origin::default()
         }
     }
 
@@ -567,6 +604,8 @@ impl Ready {
                 })
                 .collect(),
             generated: Vec::new(),
+            meshes: None,
+            mesh: Vec::new(),
             output: emission,
             bound: self.scene.reading,
             goal: self.scene.goal,

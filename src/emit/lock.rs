@@ -36,6 +36,10 @@ pub struct Lock {
     pub textures: Vec<LockedTexture>,
     /// Every texture that was made for levels.
     pub generated: Vec<LockedGenerated>,
+    /// The file of the meshes that were made for levels; `None` where all have the scene's own.
+    pub meshes: Option<LockedFile>,
+    /// From where on each of its meshes is used, nearest first; the first is the original.
+    pub mesh: Vec<LockedMesh>,
     /// What is emitted.
     pub output: Output,
     /// How errors were held against the bound.
@@ -123,6 +127,20 @@ pub struct LockedGenerated {
     pub levels: u32,
 }
 
+/// A mesh of a lock.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LockedMesh {
+    /// Which level of the file it is, from 0.
+    pub level: usize,
+    /// The autoLOD from which it is used.
+    pub autolod: f32,
+    /// The distance at which that is reached, in world units.
+    pub distance: f64,
+    /// How many triangles it has.
+    pub triangles: usize,
+}
+
 /// A level of a lock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LockedLevel {
@@ -192,7 +210,11 @@ impl Lock {
                 definitions.join(", ")
             ));
         }
-        for (key, file) in [("scene", &self.scene), ("lighting", &self.lighting)] {
+        for (key, file) in [
+            ("scene", &self.scene),
+            ("lighting", &self.lighting),
+            ("meshes", &self.meshes),
+        ] {
             if let Some(file) = file {
                 line(format!(
                     "{key} = {{ file = {}, hash = {} }}",
@@ -268,6 +290,14 @@ impl Lock {
                 line(format!("  {},", step(candidate)));
             }
             line("]".to_owned());
+        }
+        for mesh in &self.mesh {
+            line(String::new());
+            line("[[mesh]]".to_owned());
+            line(format!("level = {}", mesh.level));
+            line(format!("autolod = {:?}", mesh.autolod));
+            line(format!("distance = {}", number(mesh.distance)));
+            line(format!("triangles = {}", mesh.triangles));
         }
         for level in &self.levels {
             line(String::new());
@@ -390,6 +420,8 @@ impl Lock {
             lighting: raw.lighting,
             textures: raw.textures,
             generated: raw.generated,
+            meshes: raw.meshes,
+            mesh: raw.mesh,
             output: raw.output,
             bound: raw.bound,
             goal: match raw.goal {
@@ -574,6 +606,9 @@ struct RawLock {
     modules: RawModules,
     scene: Option<LockedFile>,
     lighting: Option<LockedFile>,
+    meshes: Option<LockedFile>,
+    #[serde(default)]
+    mesh: Vec<LockedMesh>,
     #[serde(default)]
     textures: Vec<LockedTexture>,
     #[serde(default)]
@@ -719,6 +754,16 @@ mod tests {
                 file: "textures/grime.png".into(),
                 hash: hash(b"texture"),
                 texels_per_pixel: Some(0.1),
+            }],
+            meshes: Some(LockedFile {
+                file: "brick.lod/brick.glb".into(),
+                hash: hash(b"meshes"),
+            }),
+            mesh: vec![LockedMesh {
+                level: 1,
+                autolod: 0.7,
+                distance: 4.25,
+                triangles: 1204,
             }],
             generated: vec![LockedGenerated {
                 name: "loctx_0_grime".into(),

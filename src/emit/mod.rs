@@ -40,8 +40,8 @@ use generated::Settled;
 pub(crate) use generated::settled;
 pub use generated::{GeneratedTexture, generated_textures};
 pub use lock::{
-    FORMAT, Lock, LockedFile, LockedGenerated, LockedLevel, LockedModules, LockedSource,
-    LockedTexture, figure,
+    FORMAT, Lock, LockedFile, LockedGenerated, LockedLevel, LockedMesh, LockedModules,
+    LockedSource, LockedTexture, figure,
 };
 pub use says::says;
 #[cfg(feature = "search")]

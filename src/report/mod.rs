@@ -7,11 +7,15 @@ mod calibration;
 mod comparison;
 mod exact;
 #[cfg(feature = "mesh")]
+mod joint;
+#[cfg(feature = "mesh")]
 mod meshes;
 mod terminal;
 
 pub use calibration::calibration;
 pub use comparison::{ComparedAt, Comparison};
+#[cfg(feature = "mesh")]
+pub use joint::{JointReport, PricesReport, ScoreReport, WalkReport};
 #[cfg(feature = "mesh")]
 pub use meshes::{mesh_error, mesh_error_json, mesh_levels, seen_mesh};
 pub use terminal::{inspection, next, summary, table};
@@ -56,6 +60,10 @@ pub struct Report {
     pub frontier: Vec<FrontierReport>,
     /// The textures that were made for levels.
     pub generated: Vec<GeneratedReport>,
+    /// What a joint search of meshes and shaders has looked at; not there without one.
+    #[cfg(feature = "mesh")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointReport>,
     /// What was left out, and why.
     pub left_out: Vec<String>,
     /// What should be known about this result.
@@ -203,7 +211,7 @@ pub struct ErrorReport {
     pub shimmer: f64,
     /// That of the original.
     pub shimmer_floor: f64,
-    /// Error of the transition into the level; not measured yet.
+    /// What is seen where the level takes the place of the one before, as a root mean square; null where that was not measured.
     pub transition: Option<f64>,
 }
 
@@ -440,6 +448,13 @@ pub struct Origin {
     pub transitions: Vec<Option<TransitionReport>>,
     /// The textures that were made for levels.
     pub generated: Vec<LockedGenerated>,
+    /// The mesh of each level; the scene's own where there is none.
+    pub meshes: Vec<MeshReport>,
+    /// What is seen where each level begins.
+    pub shown: Vec<Option<f64>>,
+    /// What a joint search has looked at.
+    #[cfg(feature = "mesh")]
+    pub joint: Option<JointReport>,
 }
 
 impl Report {
@@ -451,14 +466,21 @@ impl Report {
         says: &[String],
         origin: Origin,
     ) -> Self {
-        let level = |(at, (level, says)): (usize, (&Level, &String))| LevelReport {
-            transition: origin.transitions.get(at).cloned().flatten(),
-            time: TimeReport::of(
-                level.time,
-                (&level.timed, &level.branching),
-                &found.adapters,
-            ),
-            ..level_report(level, says.clone(), base, source, &origin)
+        let level = |(at, (level, says)): (usize, (&Level, &String))| {
+            let mut report = LevelReport {
+                transition: origin.transitions.get(at).cloned().flatten(),
+                time: TimeReport::of(
+                    level.time,
+                    (&level.timed, &level.branching),
+                    &found.adapters,
+                ),
+                ..level_report(level, says.clone(), base, source, &origin)
+            };
+            if let Some(mesh) = origin.meshes.get(at) {
+                report.mesh = mesh.clone();
+            }
+            report.error.transition = origin.shown.get(at).copied().flatten();
+            report
         };
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -495,6 +517,8 @@ impl Report {
             warnings: origin.warnings,
             inferences: origin.inferences,
             generated: origin.generated.into_iter().map(Into::into).collect(),
+            #[cfg(feature = "mesh")]
+            joint: origin.joint,
         }
     }
 

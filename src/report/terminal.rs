@@ -46,7 +46,10 @@ pub fn table(report: &Report) -> String {
             unless(format!("{:.3}", level.error.bound)),
             time(&level.time),
             samples(level.cost.texture_samples),
-            level.says.clone(),
+            match level.mesh.file {
+                Some(_) => format!("{}; {} triangles", level.says, level.mesh.triangles),
+                None => level.says.clone(),
+            },
         ]);
     }
     columns(
@@ -173,6 +176,10 @@ pub fn summary(report: &Report) -> String {
     out.push_str(&timed(report));
     if !is_timed(report) || report.goal != "time" {
         out.push_str(&cost(report));
+    }
+    #[cfg(feature = "mesh")]
+    if let Some(joint) = &report.joint {
+        out.push_str(&joint.summary());
     }
     out.push_str(&exact(report));
     out.push_str(&held_out(report));

@@ -493,14 +493,7 @@ pub fn find(
         });
     }
     let mut levels = chain.levels;
-    let ways = Ways::new(stand)?;
-    for level in &mut levels {
-        stand_of(&whole, &exact, level)?;
-        if !level.is_original {
-            let recipe = derivation(&exact, level);
-            level.stiff = ways.compare((stand.base, &recipe), &level.shader)?;
-        }
-    }
+    examine(stand, (&whole, &exact), &mut levels)?;
     Ok(Found {
         exact,
         levels,
@@ -510,6 +503,23 @@ pub fn find(
         adapters: times.map_or_else(Vec::new, |times| times.clock.adapters().to_vec()),
         rho0: scene.rho0(),
     })
+}
+
+/// Says how levels stand that were not asked, and what is stiff in them.
+pub(crate) fn examine(
+    stand: &Stand<'_>,
+    (battery, exact): (&Battery<'_>, &Exact),
+    levels: &mut [Level],
+) -> Result<(), Refused> {
+    let ways = Ways::new(stand)?;
+    for level in levels {
+        stand_of(battery, exact, level)?;
+        if !level.is_original {
+            let recipe = derivation(exact, level);
+            level.stiff = ways.compare((stand.base, &recipe), &level.shader)?;
+        }
+    }
+    Ok(())
 }
 
 /// How a level is made from the original.

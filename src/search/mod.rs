@@ -40,6 +40,8 @@ pub use frontier::{Frontier, Seen};
 pub use greedy::try_each;
 pub use kept::Kept;
 pub(crate) use kept::is_within;
+#[cfg(feature = "mesh")]
+pub(crate) use levels::examine;
 pub(crate) use levels::threshold;
 pub use levels::{AtDistance, Found, Level, Progress, Struck, find};
 pub use samples::{Measured, OverBlack, SampleSet, Samples};

@@ -28,6 +28,10 @@ const MOST_TILES: usize = 96 * 1024;
 /// How many pictures a held-out split has.
 const HELD_OUT: usize = 16;
 
+/// The most tiles of a set of [`Samples::Tiles`], over all frames and offsets: 200,000 fragments.
+#[cfg(feature = "mesh")]
+const SOME_TILES: usize = 3 * 1024;
+
 /// The least bound that errors are weighed by, so that a bound of 0 weighs them too.
 const LEAST_BOUND: f64 = 1e-6;
 
@@ -40,6 +44,9 @@ pub enum Samples {
     /// A part that is quick to shade: squares of pixels spread evenly over every frame, each frame at one of the
     /// offsets in turn.
     Search,
+    /// A part that tells all that the strain asks for: whole tiles of every frame, at every offset.
+    #[cfg(feature = "mesh")]
+    Tiles,
     /// All of them: every pixel of every frame at every offset.
     Full,
     /// Pictures that the search does not see, every pixel of each: independent draws of a view, of the uniforms and of
@@ -104,8 +111,9 @@ impl<'a> SampleSet<'a> {
     /// # Errors
     /// When the evaluator refuses the original.
     pub fn new(stand: &'a Stand<'a>, distance: f64, samples: Samples) -> Result<Self, Refused> {
-        let [set] = Self::beside([stand], distance, samples)?;
-        Ok(set)
+        let mut sets = Self::beside(&[stand], distance, samples)?;
+        // One for each stand.
+        Ok(sets.swap_remove(0))
     }
 
     /// The samples of two shaders of one scene at a distance, for [`crate::scene::Scene::read_both`]. The first is the
@@ -119,15 +127,30 @@ impl<'a> SampleSet<'a> {
         distance: f64,
         samples: Samples,
     ) -> Result<[Self; 2], Refused> {
+        let mut sets = Self::beside(&stands, distance, samples)?;
+        let second = sets.swap_remove(1);
+        Ok([sets.swap_remove(0), second])
+    }
+
+    /// The same of one shader in scenes that differ in their meshes alone: one set for each, against the pictures of the first.
+    ///
+    /// # Errors
+    /// When the evaluator refuses it.
+    #[cfg(feature = "mesh")]
+    pub(crate) fn of_meshes(
+        stands: &[&'a Stand<'a>],
+        distance: f64,
+        samples: Samples,
+    ) -> Result<Vec<Self>, Refused> {
         Self::beside(stands, distance, samples)
     }
 
-    /// The samples of several shaders, the original first.
-    fn beside<const N: usize>(
-        stands: [&'a Stand<'a>; N],
+    /// The samples of several shaders, of which there is at least one, the original first.
+    fn beside(
+        stands: &[&'a Stand<'a>],
         distance: f64,
         samples: Samples,
-    ) -> Result<[Self; N], Refused> {
+    ) -> Result<Vec<Self>, Refused> {
         let programs = stands
             .iter()
             .map(|stand| programs::fragment(stand.base, &[]));
@@ -135,11 +158,13 @@ impl<'a> SampleSet<'a> {
         let scene = stands[0].scene;
         let frames = match samples {
             Samples::HeldOut(split) => scene.held_out(distance, split, HELD_OUT),
-            Samples::Search | Samples::Full => scene.frames(distance),
+            _ => scene.frames(distance),
         };
         let count = frames.len().max(1);
         let part = match samples {
             Samples::Search => Part::Squares((SEARCH_SQUARES / count).max(64)),
+            #[cfg(feature = "mesh")]
+            Samples::Tiles => Part::Tiles(SOME_TILES / (count * scene.offsets)),
             Samples::Full => Part::Tiles(MOST_TILES / (count * scene.offsets)),
             Samples::HeldOut(_) => Part::Tiles(MOST_TILES / count),
         };
@@ -150,14 +175,14 @@ impl<'a> SampleSet<'a> {
                 let seed = child(scene.seed, index as u64);
                 let (view, offsets) = match samples {
                     Samples::HeldOut(_) => (index, vec![frame.offset]),
-                    Samples::Full => {
-                        let view = index / scene.uniform_samples();
-                        (view, offsets(scene.offsets, seed))
-                    }
                     Samples::Search => {
                         let view = index / scene.uniform_samples();
                         let mut offsets = offsets(scene.offsets, seed);
                         (view, vec![offsets.swap_remove(index % scene.offsets)])
+                    }
+                    _ => {
+                        let view = index / scene.uniform_samples();
+                        (view, offsets(scene.offsets, seed))
                     }
                 };
                 let pens = stands.iter().zip(&programs).map(|(stand, fragment)| {
@@ -172,7 +197,7 @@ impl<'a> SampleSet<'a> {
                 Rasterised::new(&pens, view, &offsets, (part, seed))
             })
             .collect();
-        let mut sets = stands.map(|stand| Self {
+        let sets = stands.iter().map(|stand| Self {
             stand,
             distance,
             whole: samples != Samples::Search,
@@ -180,6 +205,7 @@ impl<'a> SampleSet<'a> {
             original: Drawn::default(),
             extent: OnceLock::new(),
         });
+        let mut sets: Vec<Self> = sets.collect();
         for of_all in rasterised {
             for (set, mut frame) in sets.iter_mut().zip(of_all) {
                 // Full sets meet few variants, and would take too much memory.
@@ -269,7 +295,7 @@ impl<'a> SampleSet<'a> {
     }
 
     /// Measures a variant, with all that was measured of it.
-    pub(super) fn in_full(&self, programs: &Programs) -> (Details, Measured) {
+    pub(crate) fn in_full(&self, programs: &Programs) -> (Details, Measured) {
         let drawn = self.draw(programs);
         let measured = self.judge(&drawn);
         (drawn.details, measured)
@@ -289,6 +315,18 @@ impl<'a> SampleSet<'a> {
             };
             matches!(&differences[..], [one, other] if bits(one) == bits(other))
         }))
+    }
+
+    /// What a variant leaves at each pixel of every picture, as it is displayed, over both backgrounds. Sets that were made together have
+    /// the same pixels in the same order.
+    #[cfg(feature = "mesh")]
+    pub(crate) fn left(&self, programs: &Programs) -> Vec<[f32; 6]> {
+        let output = self.stand.scene.output;
+        let one = std::slice::from_ref(programs);
+        let frames = self.frames.par_iter();
+        let frames: Vec<Vec<Vec<[f32; 6]>>> =
+            frames.map(|frame| frame.differences(one, output)).collect();
+        frames.into_iter().flatten().flatten().collect()
     }
 
     /// All error figures of a variant, against the original's and the bound at this distance.
@@ -344,7 +382,7 @@ impl<'a> SampleSet<'a> {
     }
 
     /// Measures the original and a variant of it frame by frame: what a held-out split is judged by.
-    pub(super) fn pair(&self, shader: &Shader) -> Result<(Details, &Details), Refused> {
+    pub(crate) fn pair(&self, shader: &Shader) -> Result<(Details, &Details), Refused> {
         let drawn = self.draw(&Programs::of(shader)?);
         Ok((drawn.details, &self.original.details))
     }
@@ -374,7 +412,7 @@ impl<'a> SampleSet<'a> {
             .strain_of_tiles()
     }
 
-    pub(super) fn figures_of(&self, details: &Details) -> ErrorFigures {
+    pub(crate) fn figures_of(&self, details: &Details) -> ErrorFigures {
         let scene = self.stand.scene;
         let bound = (scene.bound(self.distance), scene.reading);
         ErrorFigures::new(details, &self.original.details, bound)

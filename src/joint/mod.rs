@@ -1,0 +1,289 @@
+//! The joint search: which pairs of a mesh and a shader are worth having, and from which distances on.
+//!
+//! ```text
+//! scene's mesh --candidates--> meshes       worth keeping, of a simplification by pictures
+//! Found --candidates--> shaders             of the frontiers of a search on the scene's own mesh
+//! meshes x shaders --walk--> pairs          at each distance, along the boundary of what is within the bound
+//! pairs x distances --seen--> errors, times, and what is seen where one replaces another
+//! --table, lodc_joint--> plan               which pair is used in which bin of distances
+//! plan --confirm--> levels                  or the table is corrected, and another plan is made
+//! ```
+//!
+//! What is chosen from numbers alone is [`lodc_joint`]'s. The search of shaders and the simplification of meshes do not know of
+//! each other; this is where they meet. It knows nothing of the command line or of reports.
+//!
+//! This work is based on: Liang 2022, sections 5 and 6.
+
+mod candidates;
+mod confirm;
+mod seen;
+mod table;
+
+use crate::eval::program::{Program, Refused};
+use crate::eval::programs::Stand;
+use crate::mesh::{self, Subject};
+use crate::scene::Scene;
+use crate::search::{Found, Level, SampleSet, Samples, examine};
+use crate::stability::Battery;
+use crate::time::model::Model;
+use confirm::Confirmer;
+use lodc_joint::{Monotonicity, NEAR, Pair, Prices, Score, exhaustive, near_fastest, walk};
+use lodc_mesh::Mesh;
+use seen::{At, Candidates};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use table::Table;
+
+/// How pairs are looked for at a distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Way {
+    /// Along the boundary of what is within the bound: at most K + L of K x L.
+    #[default]
+    Separate,
+    /// All of them.
+    Exhaustive,
+}
+
+/// How much is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How pairs are looked for.
+    pub way: Way,
+    /// How many meshes there are at most, with the original: Liang's K.
+    pub meshes: usize,
+    /// How many shaders there are at most, with the original: Liang's L.
+    pub shaders: usize,
+    /// How many pairs of a distance are candidates for levels at most.
+    pub pairs: usize,
+    /// How meshes are simplified.
+    pub simplification: mesh::Settings,
+    /// What transitions and switches cost.
+    pub prices: Prices,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            way: Way::default(),
+            meshes: 16,
+            shaders: 24,
+            pairs: 4,
+            simplification: mesh::Settings::default(),
+            prices: Prices::default(),
+        }
+    }
+}
+
+/// What was looked at, at one distance.
+#[derive(Clone, Debug)]
+pub struct Walked {
+    /// From the eye to the object's centre, world units.
+    pub distance: f64,
+    /// How many pairs.
+    pub pairs: usize,
+    /// How far their errors were monotone.
+    pub monotonicity: Monotonicity,
+}
+
+/// What three ways to choose among the same pairs come to.
+#[derive(Clone, Copy, Debug)]
+pub struct Scores {
+    /// Of what was chosen: thresholds and pairs at once.
+    pub chosen: Score,
+    /// Of the paper's steps: the smoothest path through the fastest pairs of the distances, merged.
+    pub paper: Score,
+    /// Of the fastest pair of each bin.
+    pub fastest: Score,
+}
+
+/// A level: a pair, from a distance on.
+#[derive(Clone, Debug)]
+pub struct JointLevel {
+    /// The shader, with the error and the time of the pair.
+    pub level: Level,
+    /// Which mesh; 0 is the scene's own.
+    pub mesh: usize,
+    /// What is seen where it takes the place of the level before, as a root mean square, 0..1; nothing for the first.
+    pub shown: Option<f64>,
+}
+
+/// What a joint search gives.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// The levels, nearest first; the first is the original.
+    pub levels: Vec<JointLevel>,
+    /// The meshes that there were to choose from, the scene's own first.
+    pub meshes: Vec<Arc<Mesh>>,
+    /// How many shaders there were.
+    pub shaders: usize,
+    /// What was looked at.
+    pub walked: Vec<Walked>,
+    /// What the choice comes to, beside others.
+    pub scores: Scores,
+    /// What transitions and switches cost.
+    pub prices: Prices,
+}
+
+/// Looks for pairs of a mesh and a shader. `fragment` is the original's fragment stage; shaders are those that `found` has seen
+/// on the scene's own mesh, and `unstable` says whether they may fail on inputs on which the original holds.
+///
+/// # Errors
+/// When the evaluator refuses the original, at the expression.
+pub fn find(
+    stand: &Stand<'_>,
+    fragment: &Program,
+    found: &Found,
+    (settings, unstable): (&Settings, bool),
+) -> Result<Joint, Refused> {
+    let scene = stand.scene;
+    let subject = Subject {
+        vertex: stand.vertex,
+        fragment,
+        scene,
+    };
+    let meshes = candidates::meshes(subject, settings);
+    let scenes: Vec<Scene> = (meshes.iter())
+        .map(|mesh| {
+            let mut scene = scene.clone();
+            scene.mesh = Arc::clone(mesh);
+            scene
+        })
+        .collect();
+    let stands: Vec<Stand<'_>> = (scenes.iter())
+        .map(|scene| Stand {
+            base: stand.base,
+            vertex: stand.vertex,
+            scene,
+        })
+        .collect();
+    let shaders = candidates::shaders(stand.base, found, settings.shaders);
+    let candidates = Candidates::new(&stands, &shaders, Model::estimated())?;
+    // The original as it stands is drawn near by alone: what draws the same for less takes its place.
+    let original = Pair { mesh: 0, shader: 0 };
+    let first = usize::from(!found.exact.recipe.0.is_empty());
+
+    let mut walked = Vec::new();
+    let mut near = Vec::new();
+    let mut chosen: BTreeSet<Pair> = [
+        original,
+        Pair {
+            mesh: 0,
+            shader: first,
+        },
+    ]
+    .into();
+    for distance in scene.distances.iter().copied().skip(1) {
+        let all: Vec<usize> = (0..meshes.len()).collect();
+        let at = At::new(&candidates, &all, distance)?;
+        let order = at.by_error(first..shaders.len());
+        let bound = scene.bound(distance);
+        let pair_of = |pair: Pair| Pair {
+            shader: order[pair.shader],
+            ..pair
+        };
+        let strain = |pair: Pair| Ok::<_, Refused>(at.seen(pair_of(pair)).strain(bound));
+        let walk = match settings.way {
+            Way::Separate => walk(meshes.len(), order.len(), strain)?,
+            Way::Exhaustive => exhaustive(meshes.len(), order.len(), strain)?,
+        };
+        let within: Vec<Pair> = walk.within().into_iter().map(pair_of).collect();
+        let times: Vec<f64> = within.iter().map(|pair| at.seen(*pair).time).collect();
+        let fastest = near_fastest(&times, NEAR).into_iter().take(settings.pairs);
+        let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
+        chosen.extend(&fastest);
+        near.push(fastest);
+        walked.push(Walked {
+            distance,
+            pairs: walk.visits.len(),
+            monotonicity: walk.monotonicity(),
+        });
+    }
+
+    let mut table = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
+    let battery = Battery::new(stand)?;
+    let mut confirmer = Confirmer::new(&candidates, Some(&battery).filter(|_| !unstable));
+    let (plan, confirmed) = loop {
+        let plan = table.plan();
+        let mut all = Vec::new();
+        let mut refuted = false;
+        for mut run in table.runs(&plan).into_iter().skip(1) {
+            if run.pair == original {
+                // Of what draws the same, what does it for less.
+                run.pair.shader = first;
+            }
+            match confirmer.judge(&run)? {
+                Ok(level) => all.push((run, level)),
+                Err(by) => {
+                    table.refute(&run, by);
+                    refuted = true;
+                }
+            }
+        }
+        if !refuted {
+            break (plan, all);
+        }
+    };
+    let fastest = table.fastest();
+    let paper = table.paper(&near);
+    let scores = Scores {
+        chosen: table.score(&plan),
+        paper: table.score(&paper),
+        fastest: table.score(&fastest),
+    };
+
+    let mut levels = vec![JointLevel {
+        level: found.levels[0].clone(),
+        mesh: 0,
+        shown: None,
+    }];
+    let mut before = original;
+    for (run, pieces) in confirmed {
+        let (recipe, shader) = &shaders[run.pair.shader];
+        let is_original = first == 0 && run.pair.shader == 0;
+        let mut level = [pieces.level(scene, (recipe, shader), is_original)];
+        examine(stand, (&battery, &found.exact), &mut level)?;
+        let [level] = level;
+        let last = &levels[levels.len() - 1].level;
+        if level.autolod <= last.autolod && levels.len() > 1 {
+            // Two thresholds that are the same in hundredths.
+            levels.pop();
+        }
+        levels.push(JointLevel {
+            shown: Some(shown(&candidates, [before, run.pair], run.from)?),
+            level,
+            mesh: run.pair.mesh,
+        });
+        before = run.pair;
+    }
+    Ok(Joint {
+        levels,
+        shaders: shaders.len(),
+        meshes,
+        walked,
+        scores,
+        prices: settings.prices,
+    })
+}
+
+/// What is seen where one pair takes the place of another.
+fn shown(candidates: &Candidates<'_>, pairs: [Pair; 2], distance: f64) -> Result<f64, Refused> {
+    let meshes: BTreeSet<usize> = [0, pairs[0].mesh, pairs[1].mesh].into();
+    let meshes: Vec<usize> = meshes.into_iter().collect();
+    let at = At::new(candidates, &meshes, distance)?;
+    let pictures = pairs.map(|pair| at.left(pair));
+    Ok(at.between(&pictures[0], &pictures[1]))
+}
+
+/// All samples of one mesh at a distance, against the pictures of the original.
+fn set_of<'a>(
+    stands: &'a [Stand<'a>],
+    mesh: usize,
+    distance: f64,
+    samples: Samples,
+) -> Result<SampleSet<'a>, Refused> {
+    if mesh == 0 {
+        return SampleSet::new(&stands[0], distance, samples);
+    }
+    let [_, set] = SampleSet::of_two([&stands[0], &stands[mesh]], distance, samples)?;
+    Ok(set)
+}

@@ -1,0 +1,116 @@
+//! What a joint search of meshes and shaders has looked at, as the report has it.
+
+use crate::joint::Joint;
+use lodc_joint::Score;
+use serde::Serialize;
+
+/// A joint search.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointReport {
+    /// How pairs were looked for: `separate` or `exhaustive`.
+    pub search: &'static str,
+    /// How many meshes there were to choose from, with the original.
+    pub meshes: usize,
+    /// How many shaders, with the original.
+    pub shaders: usize,
+    /// What was looked at, at each distance.
+    pub walked: Vec<WalkReport>,
+    /// What the prices are: of a unit of transition error, and of a switch, in times of the original.
+    pub prices: PricesReport,
+    /// What was chosen comes to.
+    pub chosen: ScoreReport,
+    /// What the paper's steps would have chosen among the same pairs.
+    pub paper: ScoreReport,
+    /// The fastest pair of each bin of distances.
+    pub fastest: ScoreReport,
+}
+
+/// What was looked at, at one distance.
+#[derive(Clone, Debug, Serialize)]
+pub struct WalkReport {
+    /// In world units.
+    pub distance: f64,
+    /// How many pairs.
+    pub pairs: usize,
+    /// Pairs of those of which one is simpler than the other.
+    pub compared: usize,
+    /// Those of them of which the simpler one has less error.
+    pub violated: usize,
+    /// Those of them of which the simpler one alone is within the bound.
+    pub misleading: usize,
+}
+
+/// What transitions and switches cost.
+#[derive(Clone, Debug, Serialize)]
+pub struct PricesReport {
+    /// For each unit of transition error.
+    pub transition: f64,
+    /// For each switch.
+    pub switch: f64,
+}
+
+/// What a choice of levels comes to.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScoreReport {
+    /// All together.
+    pub j: f64,
+    /// The mean time over the distances, as a share of the original's.
+    pub time: f64,
+    /// The sum of what transitions show.
+    pub transition: f64,
+    /// How many switches there are.
+    pub switches: usize,
+}
+
+impl JointReport {
+    /// Of a search that was looked for in this way.
+    pub(crate) fn new(joint: &Joint, search: &'static str) -> Self {
+        let score = |score: &Score| ScoreReport {
+            j: score.j,
+            time: score.time,
+            transition: score.transition,
+            switches: score.switches,
+        };
+        let walked = joint.walked.iter().map(|walked| WalkReport {
+            distance: walked.distance,
+            pairs: walked.pairs,
+            compared: walked.monotonicity.compared,
+            violated: walked.monotonicity.violated,
+            misleading: walked.monotonicity.misleading,
+        });
+        Self {
+            search,
+            meshes: joint.meshes.len(),
+            shaders: joint.shaders,
+            walked: walked.collect(),
+            prices: PricesReport {
+                transition: joint.prices.transition,
+                switch: joint.prices.switch,
+            },
+            chosen: score(&joint.scores.chosen),
+            paper: score(&joint.scores.paper),
+            fastest: score(&joint.scores.fastest),
+        }
+    }
+
+    /// A few lines for people.
+    pub(super) fn summary(&self) -> String {
+        let looked: usize = self.walked.iter().map(|walked| walked.pairs).sum();
+        let (compared, violated) = (self.walked.iter()).fold((0, 0), |(c, v), walked| {
+            (c + walked.compared, v + walked.violated)
+        });
+        format!(
+            "  pairs           {} meshes, {} shaders: {looked} pairs looked at, at {} distances; simpler was better in {violated} of {compared} cases\n  \
+             chosen          J {:.3}: time {:.3}, {} switches that show {:.3} together; by the paper's steps {:.3}, the fastest everywhere {:.3}\n",
+            self.meshes,
+            self.shaders,
+            self.walked.len(),
+            self.chosen.j,
+            self.chosen.time,
+            self.chosen.switches,
+            self.chosen.transition,
+            self.paper.j,
+            self.fastest.j,
+        )
+    }
+}
