@@ -225,6 +225,13 @@ fn fs_main(in: Varyings) -> @location(0) vec4f {
         verdicts.iter().all(|verdict| verdict == "stable"),
         "{verdicts:?}"
     );
+    // What the quick check of the search refuses is said as what the whole one does.
+    let left_out = &held.report.left_out;
+    let why = "because of `op-removal fs_main.low keep";
+    assert!(
+        left_out.iter().any(|line| line.contains(why)),
+        "{left_out:#?}"
+    );
 }
 
 #[test]

@@ -59,6 +59,7 @@ enum Limit {
     Off(f64, f64),
 }
 
+#[inline(always)]
 fn limit(op: Op, [a, b, c]: [f32; 3]) -> Limit {
     let [x, y, z] = [a, b, c].map(f64::from);
     match op {
@@ -90,7 +91,8 @@ fn limit(op: Op, [a, b, c]: [f32; 3]) -> Limit {
         }
         Op::Sin | Op::Cos => Limit::Off(0.0, 0.5_f64.powi(11)),
         Op::Tan => Limit::Off(4.0, 0.5_f64.powi(10) * (1.0 + x.tan().powi(2))),
-        Op::Asin | Op::Acos => Limit::Off(0.0, 6.77e-5),
+        // The worse of that and of what `atan2` has.
+        Op::Asin | Op::Acos => Limit::Off(4096.0, 6.77e-5),
         Op::Atan | Op::Atan2 => Limit::Off(4096.0, 0.0),
         Op::Sinh | Op::Cosh | Op::Tanh => Limit::Off(8.0 + 4.0 * x.abs().min(90.0), 0.0),
         Op::Asinh | Op::Acosh | Op::Atanh => Limit::Off(16.0, 0.5_f64.powi(21)),
@@ -114,16 +116,33 @@ impl Watcher<f32> for Rough {
             return;
         };
         let count = if lanes.is_some() { LANES } else { 1 };
-        for (lane, result) in floats[..count].iter_mut().enumerate() {
-            let of = |place: usize| operands.get(place).map_or(0.0, |block| block[lane]);
-            let three = [of(0), of(1), of(2)];
-            *result = self.0.rough(op, three, *result);
+        let floats = &mut floats[..count];
+        // What is done most often has a loop of its own, in which the operation is known.
+        macro_rules! known {
+            ($($name:ident)*) => {
+                match op {
+                    $(Op::$name => self.0.each(Op::$name, operands, floats),)*
+                    other => self.0.each(other, operands, floats),
+                }
+            };
         }
+        known!(Add Sub Mul Div Fma Mix Neg Abs Min Max Clamp Sqrt InverseSqrt SelectFloat);
     }
 }
 
 impl Arithmetic {
+    /// The same of every lane.
+    #[inline(always)]
+    fn each(self, op: Op, operands: &[[f32; LANES]], floats: &mut [f32]) {
+        const NONE: [f32; LANES] = [0.0; LANES];
+        let [a, b, c] = [0, 1, 2].map(|place| operands.get(place).unwrap_or(&NONE));
+        for (lane, result) in floats.iter_mut().enumerate() {
+            *result = self.rough(op, [a[lane], b[lane], c[lane]], *result);
+        }
+    }
+
     /// What an operation may give, where it should be `result`.
+    #[inline(always)]
     fn rough(self, op: Op, operands: [f32; 3], result: f32) -> f32 {
         let decides = matches!(op, Op::SelectFloat);
         if self.strict
@@ -138,9 +157,11 @@ impl Arithmetic {
         let Some(seed) = self.errors else {
             return result;
         };
-        let bits = operands.map(|operand| u64::from(operand.to_bits()));
-        let word = mix(seed ^ mix(op as u64 ^ bits[0] << 16) ^ mix(bits[1] << 32 | bits[2]));
-        let noise = (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+        let noise = || {
+            let bits = operands.map(|operand| u64::from(operand.to_bits()));
+            let word = mix(seed ^ mix(op as u64 ^ bits[0] << 16) ^ mix(bits[1] << 32 | bits[2]));
+            (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
         let off = match limit(op, operands) {
             Limit::Exact => result,
             Limit::Rounded(exact) => {
@@ -151,13 +172,17 @@ impl Arithmetic {
                     std::cmp::Ordering::Equal => nearest,
                     std::cmp::Ordering::Greater => nearest.next_down(),
                 };
-                if noise < 0.0 { nearest } else { other }
+                if other == nearest || noise() < 0.0 {
+                    nearest
+                } else {
+                    other
+                }
             }
             Limit::Off(units, more) => {
                 let own = f64::from(result);
                 // An unbounded limit says nothing of 0, and no sign is lost.
                 let share = (units * EPSILON).min(0.5);
-                (own + noise * (share * own.abs() + more)) as f32
+                (own + noise() * (share * own.abs() + more)) as f32
             }
         };
         match off.is_subnormal() && self.flushes {

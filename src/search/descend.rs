@@ -65,7 +65,11 @@ impl Bottom<'_, '_> {
         self.frontier.add(base.seen());
         let mut ways = Vec::new();
         for start in starts {
-            if !start.recipe.0.is_empty() && self.guard.allows(&start.shader, &start.measured) {
+            if !start.recipe.0.is_empty()
+                && self
+                    .guard
+                    .allows(&start.recipe, &start.shader, &start.measured)
+            {
                 ways.push(vec![base.clone().into(), start.into()]);
             }
         }
@@ -135,7 +139,9 @@ impl Bottom<'_, '_> {
                     self.checks.teach(self.guard, &last.measured, &verdict)?;
                 }
                 while let Some(Stop { variant, .. }) = way.last().filter(|_| way.len() > 1)
-                    && !self.guard.allows(&variant.shader, &variant.measured)
+                    && !self
+                        .guard
+                        .allows(&variant.recipe, &variant.shader, &variant.measured)
                 {
                     way.pop();
                 }
@@ -199,7 +205,10 @@ impl Bottom<'_, '_> {
                 continue;
             };
             let variant = Variant::new(self.interval, seen.recipe.clone(), shader)?;
-            if self.guard.allows(&variant.shader, &variant.measured) {
+            if self
+                .guard
+                .allows(&variant.recipe, &variant.shader, &variant.measured)
+            {
                 taken.push(variant.recipe.clone());
                 return Ok(Some(variant));
             }

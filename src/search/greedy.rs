@@ -235,7 +235,8 @@ impl Descent<'_, '_> {
     }
 
     fn allows(&self, variant: &Variant) -> bool {
-        self.guard.allows(&variant.shader, &variant.measured)
+        self.guard
+            .allows(&variant.recipe, &variant.shader, &variant.measured)
     }
 
     /// The variant with the best numbers in its last step, found only now that it is worth a step.
@@ -251,12 +252,15 @@ impl Descent<'_, '_> {
             .0
             .last()
             .and_then(|last| best(self.interval, &current.shader, last, &next.measured));
-        if let Some(better) = better
-            && self.guard.allows(&better.shader, &better.measured)
-        {
+        let Some(better) = better else {
+            return next;
+        };
+        let mut recipe = next.recipe.clone();
+        recipe.0.pop();
+        recipe.0.push(better.candidate);
+        if self.guard.allows(&recipe, &better.shader, &better.measured) {
             *measured += 1;
-            next.recipe.0.pop();
-            next.recipe.0.push(better.candidate);
+            next.recipe = recipe;
             next.shader = better.shader;
             next.measured = better.measured;
             frontier.add(next.seen());

@@ -11,8 +11,9 @@ use crate::emit::shared_locations;
 use crate::error::Details;
 use crate::eval::program::Refused;
 use crate::eval::programs::{Programs, Stand};
-use crate::stability::Battery;
-use lodc_passes::Shader;
+use crate::stability::{Battery, Failure};
+use lodc_passes::{Recipe, Shader};
+use std::sync::{Mutex, PoisonError};
 
 /// How many tiles of one distance are kept of a variant.
 const TILES: usize = 16;
@@ -20,6 +21,9 @@ const TILES: usize = 16;
 const HIGHEST: f64 = 1.5;
 /// How much lower the limit becomes at least when all samples refuse a variant for its mean error.
 const LOWER: f64 = 0.95;
+
+/// Of how many unstable variants of an interval it is said why.
+const MOST_UNSTABLE: usize = 4;
 
 /// What a variant has to pass before it is worth a step.
 pub(crate) struct Guard<'a> {
@@ -34,6 +38,8 @@ pub(crate) struct Guard<'a> {
     levels: Vec<Shader>,
     /// What a variant has to hold beyond the pictures.
     battery: Option<&'a Battery<'a>>,
+    /// Variants that did not, with what they fail on: one for each last step, and not many.
+    unstable: Mutex<Vec<(Recipe, Failure)>>,
 }
 
 impl<'a> Guard<'a> {
@@ -46,6 +52,7 @@ impl<'a> Guard<'a> {
             limit: 1.0,
             levels: Vec::new(),
             battery: None,
+            unstable: Mutex::default(),
         }
     }
 
@@ -91,8 +98,8 @@ impl<'a> Guard<'a> {
         measured.strain <= self.limit
     }
 
-    /// Whether nothing that is known speaks against a variant.
-    pub(crate) fn allows(&self, shader: &Shader, measured: &Measured) -> bool {
+    /// Whether nothing that is known speaks against a variant and the shader that it makes.
+    pub(crate) fn allows(&self, recipe: &Recipe, shader: &Shader, measured: &Measured) -> bool {
         self.admits(measured)
             && self.kept.holds(shader)
             && self.has_room(shader)
@@ -102,7 +109,32 @@ impl<'a> Guard<'a> {
             })
             && self
                 .battery
-                .is_none_or(|battery| battery.allows(shader).unwrap_or(false))
+                .is_none_or(|battery| match battery.objection(shader) {
+                    Ok(None) => true,
+                    Ok(Some(failure)) => {
+                        self.note(recipe, failure);
+                        false
+                    }
+                    Err(_) => false,
+                })
+    }
+
+    /// Keeps a variant that is unstable, so that it can be said why.
+    fn note(&self, recipe: &Recipe, failure: Failure) {
+        let mut unstable = self.unstable.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = |recipe: &Recipe| recipe.0.last().map(|step| step.site.clone());
+        let known = unstable
+            .iter()
+            .any(|(known, _)| last(known) == last(recipe));
+        if !known && unstable.len() < MOST_UNSTABLE {
+            unstable.push((recipe.clone(), failure));
+        }
+    }
+
+    /// The variants that were unstable since this was asked the last time, with what they fail on.
+    pub(crate) fn unstable(&mut self) -> Vec<(Recipe, Failure)> {
+        let unstable = self.unstable.get_mut();
+        std::mem::take(unstable.unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Keeps the tiles of a set that speak against a variant.
@@ -181,7 +213,8 @@ mod tests {
         let measured = search.measure(&flat).expect("it runs");
         let kept = Kept::default();
         let mut guard = Guard::new(&stand, &kept);
-        assert!(guard.allows(&flat, &measured), "{measured:?}");
+        let plain = Recipe::default();
+        assert!(guard.allows(&plain, &flat, &measured), "{measured:?}");
 
         let full = SampleSet::new(&stand, near, Samples::Full).expect("it runs");
         let programs = Programs::of(&flat).expect("it runs");
@@ -192,15 +225,15 @@ mod tests {
             "{figures:?}"
         );
         guard.keep(&full, &details).expect("it runs");
-        assert!(!guard.allows(&flat, &measured));
-        assert!(guard.allows(&base, &search.start().original()));
+        assert!(!guard.allows(&plain, &flat, &measured));
+        assert!(guard.allows(&plain, &base, &search.start().original()));
         // Some tiles say what all say.
         assert_eq!(
             guard.tiles[0].strain_of_tiles(&programs),
             figures.strain_of_tiles()
         );
         guard.start_at(far);
-        assert!(guard.allows(&flat, &measured));
+        assert!(guard.allows(&plain, &flat, &measured));
     }
 
     #[test]

@@ -306,10 +306,18 @@ impl<'a> Chain<'a> {
             frontier,
             found,
             withdrawn,
-            struck,
+            mut struck,
             variants,
             ..
         } = bottom;
+        for (recipe, failure) in self.guard.unstable() {
+            let more = checks.struck(&recipe, &failure);
+            let step = |struck: &Struck| {
+                let candidate = struck.blamed.candidate.as_ref();
+                candidate.map(|(_, candidate)| candidate.clone())
+            };
+            struck.extend(more.filter(|more| struck.iter().all(|known| step(known) != step(more))));
+        }
         *tally = Tally {
             frontier,
             variants,

@@ -2,7 +2,7 @@
 
 use super::obligations::{Digits, First, Place, wants};
 use super::run::{Failure, Given, Subject, fed, shade};
-use super::{Battery, Exhibit, Inputs, Reach, inputs};
+use super::{Battery, Breach, Exhibit, Inputs, Reach, inputs};
 use crate::Diagnostic;
 use crate::eval::lane::LANES;
 use crate::eval::machine::Machine;
@@ -51,8 +51,8 @@ pub struct Blamed {
     pub reach: Reach,
     /// Whether it takes roundings that WGSL allows and the evaluator does not have.
     pub rounded: bool,
-    /// Whether a divisor crosses 0, rather than that something is not finite.
-    pub is_pole: bool,
+    /// What is worse than in the original, where nothing that is returned is bad.
+    pub breach: Option<Breach>,
 }
 
 impl Battery<'_> {
@@ -87,7 +87,7 @@ impl Battery<'_> {
     }
 
     /// The exhibit of a failure.
-    fn exhibit_of(&self, failure: &Failure) -> Cow<'_, Exhibit> {
+    pub(super) fn exhibit_of(&self, failure: &Failure) -> Cow<'_, Exhibit> {
         match &failure.group {
             Some(group) => {
                 let frame = self.interface.frame(group);
@@ -109,15 +109,8 @@ impl Battery<'_> {
         exhibit: &Exhibit,
         failure: &Failure,
     ) -> bool {
-        match &failure.pole {
-            Some(path) => {
-                let divisors = self.divisors_of(subject, shader, exhibit);
-                let above = self.divisors.0.get(path).is_some_and(|d| d.least.0 > 0.0);
-                divisors.0.get(path).is_some_and(|signs| match above {
-                    true => signs.least.0 <= 0.0,
-                    false => signs.most.0 >= 0.0,
-                })
-            }
+        match &failure.law {
+            Some(broken) => self.breaks(subject, shader, exhibit, broken).is_some(),
             None => {
                 let bad = self.run(subject, exhibit, self.arithmetics[failure.arithmetic]);
                 let original = exhibit.original.get(failure.arithmetic);
@@ -142,7 +135,7 @@ impl Battery<'_> {
             input: Vec::new(),
             reach: exhibit.reach(),
             rounded: arithmetic != Arithmetic::OWN,
-            is_pole: failure.pole.is_some(),
+            breach: failure.law.as_ref().map(|broken| broken.breach),
         };
         let Ok(programs) = Programs::of(shader) else {
             return blamed;
@@ -168,11 +161,15 @@ impl Battery<'_> {
         let fragment = &subject.programs.fragment;
         let mut first = First::new(failure.lane, rough());
         let (outputs, _) = shade(fragment, &given, block, Some(&mut first));
-        let found = match &failure.pole {
-            // Nothing is bad yet: the quotient is what will be.
-            Some(path) => handle_of(shader, path).map(|value| {
-                let place = (value.index() as u32, lodc_passes::semantics::Op::Div);
-                (place, [f32::NAN; 3], f32::NAN)
+        let found = match &failure.law {
+            // Nothing is bad yet: what the operation gives is what will be.
+            Some(broken) => handle_of(shader, &broken.path).map(|value| {
+                let given = match broken.breach {
+                    Breach::Sign => None,
+                    Breach::Margin { .. } => self.breaks(&subject, shader, exhibit, broken),
+                };
+                let place = (value.index() as u32, broken.op);
+                (place, given.unwrap_or([f32::NAN; 3]), f32::NAN)
             }),
             None => first.found,
         };
@@ -190,7 +187,7 @@ impl Battery<'_> {
                 drop(machine);
                 if let Some(value) = digits.value {
                     blamed.wide = Some(value.wide);
-                    if blamed.is_pole {
+                    if blamed.breach.is_some() {
                         blamed.narrow = value.narrow;
                     }
                 }
@@ -300,7 +297,8 @@ impl Blamed {
         self.wants = wants(op);
         let count = op.signature().0.len();
         self.operands = operands[..count].to_vec();
-        self.operands.retain(|x| !(self.is_pole && x.is_nan()));
+        self.operands
+            .retain(|x| !(self.breach.is_some() && x.is_nan()));
         self.narrow = narrow;
         let function = shader.function(self.stage);
         let mut all = function.into_iter().flat_map(|f| f.expressions.iter());
@@ -343,13 +341,16 @@ impl Blamed {
 
     fn what(&self) -> String {
         let (operation, _) = self.wants;
-        match (self.is_pole, self.narrow) {
-            (true, _) => "a divisor crosses 0".to_owned(),
-            (false, x) if x.is_nan() => format!("{operation} gives no number"),
-            (false, x) if x.is_finite() => {
+        match (self.breach, self.narrow) {
+            (Some(Breach::Sign), _) => "a divisor crosses 0".to_owned(),
+            (Some(Breach::Margin { .. }), _) => {
+                format!("{operation} comes closer to trouble than in the original")
+            }
+            (None, x) if x.is_nan() => format!("{operation} gives no number"),
+            (None, x) if x.is_finite() => {
                 format!("{operation} is {x:e}, more than the target holds")
             }
-            (false, _) => format!("{operation} overflows"),
+            (None, _) => format!("{operation} overflows"),
         }
     }
 
@@ -369,9 +370,14 @@ impl Blamed {
             true => String::new(),
             false => format!("given {}; ", given.join(", ")),
         };
-        let remark = match self.is_pole {
-            true => "the divisor changes its sign, which it does not in the original".to_owned(),
-            false => {
+        let remark = match self.breach {
+            Some(Breach::Sign) => {
+                "the divisor changes its sign, which it does not in the original".to_owned()
+            }
+            Some(Breach::Margin { original, own }) => format!(
+                "{given}its margin is {own:.1e}, and {original:.1e} at least in the original; it wants {wanted}"
+            ),
+            None => {
                 let wide = self
                     .wide
                     .map_or(String::new(), |x| format!(", {x:e} in f64"));

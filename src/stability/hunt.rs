@@ -88,7 +88,7 @@ impl Battery<'_> {
                     block,
                     lane,
                     arithmetic: number,
-                    pole: None,
+                    law: None,
                     reach: Reach::Declared,
                 })
             });

@@ -8,19 +8,24 @@
 //! ```
 //!
 //! The law: where the original is finite and within its target's range on reachable and declared inputs, so is the variant,
-//! in the evaluator's own arithmetic and in eight whose roundings are as bad as WGSL lets them be; and no divisor of the
-//! variant changes its sign where the same one of the original has one sign only.
+//! in the evaluator's own arithmetic and in eight whose roundings are as bad as WGSL lets them be; no divisor of the
+//! variant changes its sign where the same one of the original has one sign only; and no operation comes much closer to
+//! trouble than the same one of the original, unless it is safe all the same.
 //! How often something happens is not proved by not seeing it: with n inputs and no failure the rate is below 3/n at 95 %
 //! confidence, for inputs like these (Hanley and Lippman-Hand, "If nothing goes wrong, is everything all right?", 1983).
 
 mod blame;
+mod fed;
 mod hunt;
 mod inputs;
+mod law;
 mod obligations;
 mod run;
 mod stiff;
 
 pub use blame::{Blamed, Number};
+pub use fed::Fed;
+pub use law::Breach;
 pub use run::Failure;
 pub use stiff::{Change, Stiff, Ways};
 
@@ -30,9 +35,10 @@ use crate::eval::raster::{Coverage, Frame, rasterize};
 use crate::eval::rough::Arithmetic;
 use crate::scene::Split;
 use inputs::{Group, Interface};
+use law::{Operands, Paths};
 use lodc_passes::{Recipe, Shader, Stage};
 use rayon::prelude::*;
-use run::{Bad, Divisors, Subject};
+use run::{Bad, Subject};
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
@@ -100,8 +106,8 @@ pub struct Battery<'a> {
     original: Subject,
     arithmetics: Vec<Arithmetic>,
     exhibits: Vec<Exhibit>,
-    /// The divisors of the original.
-    divisors: Divisors,
+    /// What the operations of the original are given.
+    operands: Operands,
     /// The largest number that the target holds.
     most: f32,
     /// What variants failed on: asked first.
@@ -183,7 +189,7 @@ impl<'a> Battery<'a> {
             original,
             arithmetics,
             exhibits: Vec::new(),
-            divisors: Divisors::default(),
+            operands: Operands::default(),
             most: match scene.output {
                 crate::scene::Output::Linear { .. } => 65504.0,
                 _ => f32::MAX,
@@ -220,13 +226,14 @@ impl<'a> Battery<'a> {
             .into_par_iter()
             .map(|(frame, inputs)| battery.exhibit(frame, inputs))
             .collect();
-        let divisors: Vec<Divisors> = battery
+        let paths = Paths::of(stand.base);
+        let operands: Vec<Operands> = battery
             .exhibits
             .par_iter()
-            .map(|exhibit| battery.divisors_of(&battery.original, stand.base, exhibit))
+            .map(|exhibit| battery.operands_of(&battery.original, &paths, exhibit))
             .collect();
-        for each in divisors {
-            battery.divisors.absorb(each);
+        for each in operands {
+            battery.operands.absorb(each);
         }
         Ok(battery)
     }
@@ -275,7 +282,7 @@ impl<'a> Battery<'a> {
             .collect();
         let mut failures: Vec<Failure> = found.into_iter().flatten().collect();
         if failures.is_empty() {
-            failures.extend(self.poles(&subject, shader));
+            failures.extend(self.broken(&subject, shader));
         }
         failures.sort_by_key(|failure| failure.reach);
         let of_original = self.of_original();
@@ -291,26 +298,32 @@ impl<'a> Battery<'a> {
         })
     }
 
-    /// Whether nothing speaks against a shader that is quick to see: what others failed on, and the evaluator's own arithmetic.
+    /// What speaks against a shader, of what is quick to see: what others failed on, and the evaluator's own arithmetic.
     ///
     /// # Errors
     /// When the evaluator refuses it.
-    pub fn allows(&self, shader: &Shader) -> Result<bool, Refused> {
+    pub fn objection(&self, shader: &Shader) -> Result<Option<Failure>, Refused> {
         let subject = Subject::new(Programs::of(shader)?);
         let hazards = self.hazards.lock().unwrap_or_else(PoisonError::into_inner);
         let hazards = hazards.clone();
-        if hazards
-            .iter()
-            .any(|hazard| self.fails(&subject, shader, hazard))
-        {
-            return Ok(false);
+        let mut known = hazards.into_iter();
+        if let Some(known) = known.find(|hazard| self.fails(&subject, shader, hazard)) {
+            return Ok(Some(known));
         }
-        let fails = |exhibit: &Exhibit| {
+        let exhibits = self.exhibits.par_iter().enumerate();
+        Ok(exhibits.find_map_first(|(at, exhibit)| {
             let bad = self.run(&subject, exhibit, Arithmetic::OWN);
-            let original = exhibit.original.first();
-            original.is_some_and(|original| bad.first_beyond(original).is_some())
-        };
-        Ok(!self.exhibits.par_iter().any(fails))
+            let (block, lane) = bad.first_beyond(exhibit.original.first()?)?;
+            Some(Failure {
+                exhibit: at,
+                group: None,
+                block,
+                lane,
+                arithmetic: 0,
+                law: None,
+                reach: exhibit.reach(),
+            })
+        }))
     }
 
     /// How the original stands by itself.
@@ -333,19 +346,20 @@ impl<'a> Battery<'a> {
         let mut found: Vec<(Blamed, Failure)> = Vec::new();
         for arithmetic in 0..self.arithmetics.len() {
             for (at, exhibit) in self.exhibits.iter().enumerate() {
-                // What the evaluator's own arithmetic shows is explained by that.
-                let own = match arithmetic {
-                    0 => &exhibit.hostile[0],
-                    _ => &exhibit.original[0],
+                // What the evaluator's own arithmetic shows is explained by that, and what comes from the vertices is not judged.
+                let hostile = exhibit.hostile[arithmetic].clone();
+                let known = match arithmetic {
+                    0 => hostile,
+                    _ => hostile.or(&exhibit.original[0]),
                 };
-                for (block, lane) in exhibit.original[arithmetic].some(LINTED, own) {
+                for (block, lane) in exhibit.original[arithmetic].some(LINTED, &known) {
                     let failure = Failure {
                         exhibit: at,
                         group: None,
                         block,
                         lane,
                         arithmetic,
-                        pole: None,
+                        law: None,
                         reach: exhibit.reach(),
                     };
                     let blamed = self.blame((base, &Recipe::default()), &failure);

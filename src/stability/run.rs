@@ -1,18 +1,16 @@
 //! Runs one shader over one exhibit, and sees which fragments are bad: not finite, or beyond what the target holds.
 
 use super::inputs::{Group, Interface};
-use super::{Battery, Exhibit, Inputs, Reach, path_of};
+use super::law::Broken;
+use super::{Battery, Exhibit, Inputs, Reach};
 use crate::eval::lane::{LANES, Mask, Words};
-use crate::eval::machine::{Machine, Outcome, Watcher};
+use crate::eval::machine::{Machine, Watcher};
 use crate::eval::program::{Program, Slot};
 use crate::eval::programs::{Programs, Stand};
 use crate::eval::raster::{Block, Frame, on_spots};
 use crate::eval::rough::{Arithmetic, Rough};
-use lodc_passes::Shader;
-use lodc_passes::semantics::Op;
 use naga::{Binding, ScalarKind};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 /// What is run: the programs of a shader.
 pub(crate) struct Subject {
@@ -47,6 +45,11 @@ pub(crate) struct Bad {
 }
 
 impl Bad {
+    /// Which are bad in a block.
+    pub(crate) fn block(&self, at: usize) -> Mask {
+        self.blocks.get(at).copied().unwrap_or_default()
+    }
+
     /// The first block and lane that is bad here and not there.
     pub(crate) fn first_beyond(&self, other: &Self) -> Option<(usize, usize)> {
         let blocks = self.blocks.iter().zip(&other.blocks).enumerate();
@@ -102,8 +105,8 @@ pub struct Failure {
     pub(crate) block: usize,
     pub(crate) lane: usize,
     pub(crate) arithmetic: usize,
-    /// The divisor that crosses 0, where no number is bad.
-    pub(crate) pole: Option<String>,
+    /// The operation that breaks the law, where no number is bad.
+    pub(crate) law: Option<Broken>,
     /// Where the input comes from.
     pub reach: Reach,
 }
@@ -251,7 +254,7 @@ impl Battery<'_> {
                     block,
                     lane,
                     arithmetic: number,
-                    pole: None,
+                    law: None,
                     reach: exhibit.reach(),
                 });
             }
@@ -282,141 +285,4 @@ pub(crate) fn fed(program: &Program, given: &Given<'_>, block: &Block) -> Vec<Wo
         at.map_or([0; LANES], |at| block.inputs[at])
     });
     slots.collect()
-}
-
-/// Which signs each divisor takes, by the path of its quotient.
-#[derive(Debug, Default)]
-pub(crate) struct Divisors(pub(crate) BTreeMap<String, Signs>);
-
-/// Where a divisor is least and where it is greatest: exhibit aside, block, lane.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Signs {
-    pub(crate) least: (f32, usize, usize),
-    pub(crate) most: (f32, usize, usize),
-}
-
-impl Signs {
-    /// Whether it is 0 somewhere, or on both sides of it.
-    pub(crate) fn crosses(&self) -> bool {
-        self.least.0 <= 0.0 && self.most.0 >= 0.0
-    }
-}
-
-impl Divisors {
-    pub(crate) fn absorb(&mut self, other: Self) {
-        for (path, theirs) in other.0 {
-            let ours = self.0.entry(path).or_insert(theirs);
-            if theirs.least.0 < ours.least.0 {
-                ours.least = theirs.least;
-            }
-            if theirs.most.0 > ours.most.0 {
-                ours.most = theirs.most;
-            }
-        }
-    }
-}
-
-/// Sees what is divided by.
-#[derive(Debug, Default)]
-struct Dividing {
-    /// Lanes that do not count.
-    without: Mask,
-    block: usize,
-    found: BTreeMap<u32, Signs>,
-}
-
-impl Watcher<f32> for Dividing {
-    fn done(
-        &mut self,
-        op: Op,
-        origin: u32,
-        lanes: Option<Mask>,
-        operands: &[[f32; LANES]],
-        _: Outcome<'_, f32>,
-    ) {
-        let (Op::Div, Some(lanes), [_, divisors]) = (op, lanes, operands) else {
-            return;
-        };
-        for lane in lanes.without(self.without).lanes() {
-            let x = divisors[lane];
-            if !x.is_finite() {
-                continue;
-            }
-            let own = (x, self.block, lane);
-            let signs = self.found.entry(origin).or_insert(Signs {
-                least: own,
-                most: own,
-            });
-            if x < signs.least.0 {
-                signs.least = own;
-            }
-            if x > signs.most.0 {
-                signs.most = own;
-            }
-        }
-    }
-}
-
-impl Battery<'_> {
-    /// What a subject divides by in an exhibit, where the original is fine.
-    pub(crate) fn divisors_of(
-        &self,
-        subject: &Subject,
-        shader: &Shader,
-        exhibit: &Exhibit,
-    ) -> Divisors {
-        let given = self.given(subject, exhibit, None);
-        let mut dividing = Dividing::default();
-        for (at, block) in given.blocks.iter().enumerate() {
-            dividing.block = at;
-            let original = exhibit.original.first();
-            dividing.without = original.map_or(Mask::default(), |bad| bad.blocks[at]);
-            shade(
-                &subject.programs.fragment,
-                &given,
-                block,
-                Some(&mut dividing),
-            );
-        }
-        let mut divisors = Divisors::default();
-        for (origin, signs) in dividing.found {
-            if let Some(path) = path_of(shader, origin) {
-                divisors.absorb(Divisors(BTreeMap::from([(path, signs)])));
-            }
-        }
-        divisors
-    }
-
-    /// The divisors of a subject that cross 0 where the same of the original keep their sign.
-    pub(crate) fn poles(&self, subject: &Subject, shader: &Shader) -> Option<Failure> {
-        let mut all: Vec<(usize, Divisors)> = Vec::new();
-        for (at, exhibit) in self.exhibits.iter().enumerate() {
-            all.push((at, self.divisors_of(subject, shader, exhibit)));
-        }
-        for (path, original) in &self.divisors.0 {
-            if original.crosses() {
-                continue;
-            }
-            // The side that the original is on.
-            let above = original.least.0 > 0.0;
-            for (at, divisors) in &all {
-                let Some(signs) = divisors.0.get(path) else {
-                    continue;
-                };
-                let (x, block, lane) = if above { signs.least } else { signs.most };
-                if (above && x <= 0.0) || (!above && x >= 0.0) {
-                    return Some(Failure {
-                        exhibit: *at,
-                        group: None,
-                        block,
-                        lane,
-                        arithmetic: 0,
-                        pole: Some(path.clone()),
-                        reach: self.exhibits[*at].reach(),
-                    });
-                }
-            }
-        }
-        None
-    }
 }

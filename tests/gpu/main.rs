@@ -17,6 +17,7 @@ mod parameters;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod shaders;
+mod stable;
 mod time;
 mod vertices;
 mod worker;
