@@ -12,15 +12,16 @@ use std::process::{Command, Output};
 struct Folder(PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    fn new(name: &str, levels: usize) -> Self {
         let path = std::env::temp_dir().join(format!("lodc-joint-{name}-{}", std::process::id()));
         let _ = fs::remove_dir_all(&path);
         fs::create_dir_all(&path).unwrap();
         let materials = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/materials");
         fs::copy(materials.join("clay.wgsl"), path.join("clay.wgsl")).unwrap();
         let scene = fs::read_to_string(materials.join("clay.toml")).unwrap();
-        let small = "object = \"sphere\"\nresolution = [48, 48]\nlevels = 3\noffsets = 2";
-        let scene = scene.replace("object = \"sphere\"", small);
+        let small =
+            format!("object = \"sphere\"\nresolution = [48, 48]\nlevels = {levels}\noffsets = 2");
+        let scene = scene.replace("object = \"sphere\"", &small);
         let scene = scene.replace("count = 4", "count = 3");
         let scene = scene.replace("{ from = 3.0, to = 5.0, count = 2 }", "4.0");
         fs::write(path.join("clay.toml"), scene).unwrap();
@@ -63,7 +64,7 @@ fn list(of: &Value) -> &[Value] {
 
 #[test]
 fn pairs_become_levels_with_their_meshes() {
-    let folder = Folder::new("pairs");
+    let folder = Folder::new("pairs", 3);
     let report = folder.joined(&["--search", "separate"]);
     let joint = &report["joint"];
     let (k, l) = (number(&joint["meshes"]), number(&joint["shaders"]));
@@ -120,7 +121,7 @@ fn pairs_become_levels_with_their_meshes() {
     // It is found again, by one thread alone.
     let files = ["clay.lod.toml", "clay.lod.json", "clay.lod/clay.glb"];
     let found = files.map(|file| folder.read(file));
-    let again = Folder::new("again");
+    let again = Folder::new("again", 3);
     let mut lodc = Command::new(env!("CARGO_BIN_EXE_lodc"));
     lodc.current_dir(&again.0).env("RAYON_NUM_THREADS", "1");
     let few = ["--meshes", "6", "--shaders", "6", "--mesh-views", "6"];
@@ -136,7 +137,7 @@ fn pairs_become_levels_with_their_meshes() {
 
 #[test]
 fn meshes_alone_shaders_alone_and_all_pairs() {
-    let folder = Folder::new("alone");
+    let folder = Folder::new("alone", 2);
     let all = folder.joined(&["--search", "exhaustive"]);
     let joint = &all["joint"];
     let product = number(&joint["meshes"]) * number(&joint["shaders"]);
@@ -160,7 +161,7 @@ fn meshes_alone_shaders_alone_and_all_pairs() {
 
 #[test]
 fn what_does_not_go_together_is_said_before_the_search() {
-    let folder = Folder::new("refused");
+    let folder = Folder::new("refused", 2);
     for (flags, says) in [
         (
             &["--search", "separate", "--time", "measured"][..],
