@@ -260,6 +260,11 @@ fn the_worst_inputs_are_written_and_looked_at_again() {
     let again = looked(Some(worst.clone()));
     assert!(again.original.of_original > first.original.of_original);
 
+    // NaN and infinities are told of, and fail nothing.
+    let hostile = again.hostile[0];
+    assert!(hostile.inputs > 0 && hostile.held < hostile.inputs && hostile.lost == 0);
+    assert!(!again.fails());
+
     // With the guard it holds all of that.
     fs::write(&shader, text).expect("it can be written");
     let held = looked(Some(worst.clone()));

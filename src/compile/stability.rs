@@ -4,7 +4,7 @@ use super::Request;
 use super::search::Ready;
 use crate::emit::Lock;
 use crate::eval::refusal;
-use crate::stability::{Battery, Blamed, Judged, Reach, Stiff, Verdict, Ways};
+use crate::stability::{Battery, Blamed, Hostile, Judged, Reach, Stiff, Verdict, Ways};
 use crate::{Diagnostic, Result};
 use lodc_passes::Recipe;
 use std::fmt::Write;
@@ -28,6 +28,8 @@ pub struct Stability {
     pub original: Judged,
     /// The same of each level of the lock, with the autoLOD where it begins.
     pub levels: Vec<(f32, Judged)>,
+    /// What becomes of NaN and infinities, of the original and of each level: nothing fails for it.
+    pub hostile: Vec<Hostile>,
     /// What was found, in the user's source.
     pub findings: Vec<Box<Diagnostic>>,
     /// What is stiff in the original, and what becomes of that in each level: nothing fails for it.
@@ -41,12 +43,18 @@ pub struct Stability {
 impl Stability {
     /// A line for the original and for each level.
     pub fn table(&self) -> String {
-        let mut text = format!("  {:<16}{}\n", "original", self.original.says());
-        for (autolod, judged) in &self.levels {
-            let title = format!("autoLOD {autolod}");
+        let levels = self.levels.iter();
+        let levels = levels.map(|(autolod, judged)| (format!("autoLOD {autolod}"), judged));
+        let all = std::iter::once(("original".to_owned(), &self.original)).chain(levels);
+        let mut text = String::new();
+        let mut told = String::new();
+        for (at, (title, judged)) in all.enumerate() {
             let _ = writeln!(text, "  {title:<16}{}", judged.says());
+            if let Some(hostile) = self.hostile.get(at) {
+                let _ = writeln!(told, "  {title:<16}{}", hostile.says());
+            }
         }
-        text
+        text + &told
     }
 
     /// Whether a level fails where the original holds.
@@ -80,6 +88,7 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
     let mut stiff: Vec<Box<Diagnostic>> = ways.of_original().iter().map(stiffness).collect();
     let mut worst: Vec<_> = lint.into_iter().map(|(_, failure)| failure).collect();
     let mut levels = Vec::new();
+    let mut hostile = vec![battery.hostile_inputs(&ready.base).map_err(refused)?];
     if request.lock().is_file() {
         let (lock, text) = Lock::read(&request.lock())?;
         let name = request.lock().display().to_string();
@@ -104,6 +113,8 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
                 let note = format!("from autoLOD {} on", level.autolod);
                 stiff.push(found.with_note(note));
             }
+            let of_level = battery.hostile_inputs(&emitted.shader);
+            hostile.push(of_level.map_err(refused)?);
             levels.push((level.autolod, judged));
         }
     }
@@ -114,6 +125,7 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
     Ok(Stability {
         original,
         levels,
+        hostile,
         findings,
         stiff,
         warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),

@@ -16,6 +16,7 @@
 
 mod blame;
 mod fed;
+mod hostile;
 mod hunt;
 mod inputs;
 mod law;
@@ -25,6 +26,7 @@ mod stiff;
 
 pub use blame::{Blamed, Number};
 pub use fed::Fed;
+pub use hostile::Hostile;
 pub use law::Breach;
 pub use run::Failure;
 pub use stiff::{Change, Stiff, Ways};

@@ -8,7 +8,7 @@ use crate::eval::machine::{Outcome, Watcher};
 use crate::eval::rough::Rough;
 use crate::eval::shadow::Both;
 use lodc_passes::semantics::Op;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Which operation of which value: the place of its expression in the entry point's function.
 pub(crate) type Place = (u32, Op);
@@ -44,6 +44,32 @@ pub(crate) fn margin(op: Op, [a, b, c]: [f32; 3]) -> Option<f64> {
     })
 }
 
+/// How far an index is from the end of what it is of, as a share of that. `last` is the last that is there.
+pub(crate) fn margin_of_index(index: f32, last: f32) -> f64 {
+    let [index, last] = [index, last].map(f64::from);
+    // A negative one is a large unsigned one.
+    (last + 1.0 - index) / (last + 1.0)
+}
+
+/// What a sum or difference keeps of the digits of its operands, beyond one rounding, where they cancel; nothing where
+/// they do not.
+pub(crate) fn margin_of_digits(op: Op, [a, b, _]: [f32; 3]) -> Option<f64> {
+    let [x, y] = [a, b].map(f64::from);
+    let result = match op {
+        Op::Add => x + y,
+        Op::Sub => x - y,
+        _ => return None,
+    };
+    let larger = x.abs().max(y.abs());
+    let cancels = result.abs() < larger && larger > f64::from(f32::MIN_POSITIVE);
+    cancels.then(|| result.abs() / larger - f64::from(f32::EPSILON))
+}
+
+/// Whether its operands may cancel.
+pub(crate) fn is_sum(op: Op) -> bool {
+    matches!(op, Op::Add | Op::Sub)
+}
+
 /// What an operation is called, and what it wants of its operands.
 pub(crate) fn wants(op: Op) -> (&'static str, &'static str) {
     match op {
@@ -71,7 +97,20 @@ pub(crate) fn wants(op: Op) -> (&'static str, &'static str) {
 
 /// The least margin of each operation, with the lane that had it.
 #[derive(Debug, Default)]
-pub(crate) struct Margins(pub(crate) BTreeMap<Place, Least>);
+pub(crate) struct Margins {
+    pub(crate) least: BTreeMap<Place, Least>,
+    /// The expressions that have an index.
+    indexed: BTreeSet<u32>,
+}
+
+impl Margins {
+    pub(crate) fn of(indexed: &BTreeSet<u32>) -> Self {
+        Self {
+            least: BTreeMap::new(),
+            indexed: indexed.clone(),
+        }
+    }
+}
 
 /// The least margin of an operation in a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +128,13 @@ impl Watcher<f32> for Margins {
         operands: &[[f32; LANES]],
         _: Outcome<'_, f32>,
     ) {
-        if margin(op, [1.0; 3]).is_none() {
+        let is_index = op == Op::MinUint && self.indexed.contains(&origin);
+        let of_three = |three: [f32; 3]| match op {
+            Op::MinUint if is_index => Some(margin_of_index(three[0], three[1])),
+            Op::Add | Op::Sub => margin_of_digits(op, three),
+            _ => margin(op, three),
+        };
+        if !is_index && !is_sum(op) && margin(op, [1.0; 3]).is_none() {
             return;
         }
         let one = Mask([1, 0, 0, 0]);
@@ -97,10 +142,10 @@ impl Watcher<f32> for Margins {
             let of = |place: usize| operands.get(place).map_or(0.0, |block| block[lane]);
             let three = [of(0), of(1), of(2)];
             // What is no number came from an operation before.
-            let Some(margin) = margin(op, three).filter(|margin| !margin.is_nan()) else {
+            let Some(margin) = of_three(three).filter(|margin| !margin.is_nan()) else {
                 continue;
             };
-            let least = self.0.entry((origin, op)).or_insert(Least {
+            let least = self.least.entry((origin, op)).or_insert(Least {
                 margin: f64::INFINITY,
                 lane,
             });
@@ -236,6 +281,15 @@ mod tests {
             let [safe, trouble] = [safe, trouble].map(|three| margin(op, three));
             assert!(safe > Some(0.0) && trouble <= Some(0.0), "{op:?}");
         }
+        let [inside, last, beyond] = [1.0, 3.0, 4.0].map(|index| margin_of_index(index, 3.0));
+        assert!(inside > last && last > 0.0 && beyond <= 0.0);
+        // The words of -1.
+        assert!(margin_of_index(u32::MAX as f32, 3.0) < beyond);
+        let digits = |op, a, b| margin_of_digits(op, [a, b, 0.0]);
+        let [some, few] = [0.5, 1.0 - 1e-6].map(|x| digits(Op::Sub, 1.0, x));
+        assert!(some > few && few > Some(0.0));
+        assert!(digits(Op::Add, 1.0, -1.0) <= Some(0.0));
+        assert_eq!(digits(Op::Add, 1.0, 0.5), None);
         assert_eq!(margin(Op::Mul, [0.0; 3]), None);
         assert_eq!(margin(Op::Pow, [-1.0, 0.0, 0.0]), None);
     }

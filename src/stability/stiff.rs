@@ -729,15 +729,18 @@ fn some(found: &[Found]) -> impl Iterator<Item = &Found> {
     quads.into_values().step_by(apart).flatten().take(EXPLAINED)
 }
 
-/// The highest of each operation and kind, jumps first.
+/// Of each operation and kind the highest, or that which was moved the farthest; jumps first.
 fn told_once(all: Vec<Stiff>) -> Vec<Stiff> {
     let mut told: Vec<Stiff> = Vec::new();
     for stiff in all {
-        let known = told
-            .iter_mut()
-            .find(|known| (known.change, &known.path) == (stiff.change, &stiff.path));
+        // What is inlined in several places is told once.
+        let same = |known: &&mut Stiff| {
+            let here = known.span.is_defined() && known.span == stiff.span;
+            known.change == stiff.change && (here || known.path == stiff.path)
+        };
+        let known = told.iter_mut().find(same);
         match known {
-            Some(known) if known.height >= stiff.height => known.ways += 1,
+            Some(known) if known.far() >= stiff.far() => known.ways += 1,
             Some(known) => {
                 let ways = known.ways + 1;
                 *known = Stiff { ways, ..stiff };
@@ -907,6 +910,14 @@ fn called(op: Op) -> &'static str {
 }
 
 impl Stiff {
+    /// How far it goes: on the way for what is moved, else in height.
+    fn far(&self) -> f64 {
+        let moved = self.moved.as_ref();
+        moved.map_or(self.height.into(), |[before, after]| {
+            apart_of(before, after)
+        })
+    }
+
     /// What it is, without where.
     fn what(&self) -> String {
         let height = self.height;

@@ -6,13 +6,13 @@ use super::kernels::{self, Registers};
 use super::{Instruction, Machine};
 use crate::lane::{LANES, Lane, Mask, Words};
 use crate::program::code::Register;
-use lodc_passes::semantics::{Kind, Op};
+use lodc_passes::semantics::{Kind, Op, Real};
 
 /// Sees the operations of a machine, in the order in which they are done.
 pub trait Watcher<R>: std::fmt::Debug {
     /// An operation was done. `origin` is the place of its expression in the entry point's function, `u32::MAX` when it is of
     /// none; `lanes` are those that it counts for, nothing when it is the same for a whole draw, and then the first lane holds
-    /// it. Of `operands` the floats are there, in their order; one that is a word is 0.
+    /// it. `operands` are in their order; one that is a word is there as the unsigned number that it is.
     fn done(
         &mut self,
         op: Op,
@@ -50,9 +50,10 @@ impl<R: Lane> Machine<'_, R> {
             // What an operation reads may be where it writes.
             let mut before = [[R::default(); LANES]; 3];
             for ((before, kind), operand) in before.iter_mut().zip(kinds).zip(operands) {
-                if *kind == Kind::F {
-                    *before = float(&self.registers, operand);
-                }
+                *before = match kind {
+                    Kind::F => float(&self.registers, operand),
+                    Kind::W => word(&self.registers, operand),
+                };
             }
             let before = &before[..kinds.len()];
             let lanes = (!to.is_uniform()).then(|| self.counted());
@@ -93,5 +94,13 @@ fn float<R: Copy>(registers: &Registers<R>, register: Register) -> [R; LANES] {
     match register.is_uniform() {
         true => [registers.uniform_floats[register.index()]; LANES],
         false => *registers.floats[register.index()],
+    }
+}
+
+/// The same of a register of words.
+fn word<R: Real>(registers: &Registers<R>, register: Register) -> [R; LANES] {
+    match register.is_uniform() {
+        true => [R::from_u32(registers.uniform_words[register.index()]); LANES],
+        false => std::array::from_fn(|lane| R::from_u32(registers.words[register.index()][lane])),
     }
 }

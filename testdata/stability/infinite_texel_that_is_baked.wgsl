@@ -1,0 +1,19 @@
+// A ratio that is infinite for some texels, which does no harm until it is baked, where it is 0.
+// trap: texture-collapse fs_main.ratio
+
+struct Varyings {
+    @location(0) uv: vec2f,
+    @location(1) world_normal: vec3f,
+    @location(2) world_position: vec3f,
+}
+
+@group(0) @binding(0) var packed: texture_2d<f32>;
+@group(0) @binding(1) var filtering: sampler;
+
+@fragment
+fn fs_main(in: Varyings) -> @location(0) vec4f {
+    let texel = textureSample(packed, filtering, in.uv);
+    let ratio = (texel.r + 0.5) / (texel.g * texel.b);
+    let gloss = (0.2 + 0.1 * in.world_normal.y) / ratio;
+    return vec4f(vec3f(gloss), 1.0);
+}
