@@ -581,7 +581,7 @@ impl<'a> Ways<'a> {
             height: stretch.height,
             width: stretch.width(),
             times: before / stretch.width(),
-            within: farthest(&[stretch.from, stretch.to].map(|t| place(t)))
+            within: farthest(&[stretch.from, stretch.to].map(&place))
                 .map(|[a, b]| (apart_of(&a, &b), a.name))
                 .map(|(by, name)| (name, by)),
             input: place(stretch.middle()),
