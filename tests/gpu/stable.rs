@@ -210,9 +210,12 @@ impl Watcher<Both> for Last {
     }
 }
 
+/// An operation, the ranges of its operands, whether it is measured in units of 1, and the limits of both renderers.
+type Operation = (&'static str, [[f32; 2]; 2], bool, [f64; 2]);
+
 /// Operations of two operands, `a` and `b`, with the ranges of both, and how far the evaluator and a GPU may be from `f64`: in
 /// units in the last place of the result, or of 1 where that is marked.
-const OPERATIONS: [(&str, [[f32; 2]; 2], bool, [f64; 2]); 20] = [
+const OPERATIONS: [Operation; 20] = [
     ("a + b", [[-9.0, 9.0], [-9.0, 9.0]], false, [0.5, 0.5]),
     ("a - b", [[-9.0, 9.0], [-9.0, 9.0]], false, [0.5, 0.5]),
     ("a * b", [[-9.0, 9.0], [-9.0, 9.0]], false, [0.5, 0.5]),
