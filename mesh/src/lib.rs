@@ -28,7 +28,7 @@ mod surface;
 mod tree;
 pub mod write;
 
-pub use appearance::{CHANNELS, Quadrics, Weights, channels};
+pub use appearance::{CHANNELS, Samples, Weights, channels};
 pub use mesh::{Draw, Mesh};
 pub use subdivide::subdivide;
 pub use surface::{Collapse, FLATTEST, Kind, LARGEST_TURN, Refusal, Surface};

@@ -31,7 +31,7 @@ use super::view::{Part, Picture, View};
 use super::{Pictures, Subject, Triangles};
 use crate::eval::raster::Squares;
 use glam::DVec3;
-use lodc_mesh::{Collapse, Quadrics, Surface};
+use lodc_mesh::{Collapse, Samples, Surface};
 use lodc_passes::autolod;
 use rayon::prelude::*;
 
@@ -166,7 +166,7 @@ struct Round<'a, 's> {
     simplifier: &'s mut Simplifier<'a>,
     views: Vec<View>,
     triangles: Triangles,
-    quadrics: Quadrics,
+    samples: Samples,
     pixels_per_unit: f64,
     /// For each point its best edge by the guess; none where there is none.
     best: Vec<Option<(f64, u32)>>,
@@ -229,7 +229,7 @@ impl<'a> Simplifier<'a> {
         let pixels_per_unit = autolod::rho(&scene.view(distance));
         let weights = weights(&pictures, (&self.surface, &triangles), pixels_per_unit);
         let weight = |triangle: u32| weights.get(triangle as usize).copied();
-        let quadrics = Quadrics::new(&self.surface, &scene.mesh, |triangle| {
+        let samples = Samples::new(&self.surface, &scene.mesh, |triangle| {
             weight(triangle).unwrap_or_default()
         });
 
@@ -239,7 +239,7 @@ impl<'a> Simplifier<'a> {
             simplifier: self,
             views: pictures.views,
             triangles,
-            quadrics,
+            samples,
             pixels_per_unit,
             best: vec![None; points],
             stale: vec![true; points],
@@ -336,12 +336,12 @@ impl Round<'_, '_> {
 
     /// Finds the best edge of each point where that may have changed.
     fn guess(&mut self) {
-        let (surface, quadrics) = (&self.simplifier.surface, &self.quadrics);
+        let (surface, samples) = (&self.simplifier.surface, &self.samples);
         let best = |point: u32| {
             let edges = surface.neighbours(point).into_iter();
             let costs = edges.filter_map(|to| {
                 let collapse = surface.collapse(point, to).ok()?;
-                Some((quadrics.cost(surface, &collapse), to))
+                Some((samples.cost(surface, &collapse), to))
             });
             costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
         };
@@ -653,8 +653,8 @@ impl Round<'_, '_> {
         put(&mut self.triangles, collapse);
         let scale = self.scale();
         let simplifier = &mut *self.simplifier;
+        self.samples.apply(&simplifier.surface, collapse);
         simplifier.surface.apply(collapse);
-        self.quadrics.apply(collapse);
         self.error += one.error;
         self.change += one.change;
         self.steps.push(Step {
