@@ -1,8 +1,8 @@
 //! Simplifies a mesh by what its pictures show: edge after edge goes, those first whose loss is seen least.
 //!
 //! A collapse moves a point onto a neighbour, so that a vertex never changes and is shaded once for all. Trying every edge in
-//! the pictures would take hours, so that quadrics with attributes guess, weighed by how much the pictures react
-//! ([`super::reaction`]), and the pictures decide. A round is
+//! the pictures would take hours, so that points of the surface as it was guess what it costs ([`lodc_mesh::Samples`]), weighed by
+//! how much the pictures react ([`super::reaction`]), and the pictures correct them. A round is
 //!
 //! 1. the cheapest edges by the guess, [`Settings::share`] of them; of these a set that does not meet: no two share a triangle,
 //!    and no two may change the same square of 2 x 2 pixels in any view;
@@ -105,7 +105,7 @@ const MOST_CORRECTION: f64 = 16.0;
 const FEWEST_SAMPLES: f64 = 16.0;
 
 /// How many samples a guess is worth.
-const WORTH_OF_GUESS: f64 = 64.0;
+const WORTH_OF_GUESS: f64 = 200.0;
 
 /// How much of what the bound leaves a round may use up by guesses alone.
 const SHARE_OF_ROOM: f64 = 0.25;
