@@ -451,6 +451,10 @@ fn what_traps_fail_on_leaves_originals_finite() {
             println!("{name}: it fails in the vertex stage");
             continue;
         }
+        if made.made().next().is_some() {
+            println!("{name}: it reads a texture that was made for it");
+            continue;
+        }
         let battery = Battery::new(&stand).unwrap_or_else(|refused| panic!("{}", refused.what));
         let refused = |refused: lodc::eval::program::Refused| -> ! { panic!("{}", refused.what) };
         let mut judged = battery.judge(&made).unwrap_or_else(|r| refused(r));
