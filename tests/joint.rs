@@ -151,12 +151,17 @@ fn meshes_alone_shaders_alone_and_all_pairs() {
     for level in list(&meshes["levels"]) {
         assert!(list(&level["recipe"]).is_empty());
     }
-    assert!(j <= number(&meshes["joint"]["chosen"]["j"]) + 0.01);
+    let of_meshes = number(&meshes["joint"]["chosen"]["j"]);
+    assert!(j <= of_meshes + 0.01, "{j} of both, {of_meshes} of meshes");
     let shaders = folder.joined(&["--search", "separate", "--only", "shader"]);
     for level in list(&shaders["levels"]) {
         assert!(level["mesh"]["file"].is_null());
     }
-    assert!(j <= number(&shaders["joint"]["chosen"]["j"]) + 0.01);
+    let of_shaders = number(&shaders["joint"]["chosen"]["j"]);
+    assert!(
+        j <= of_shaders + 0.01,
+        "{j} of both, {of_shaders} of shaders"
+    );
 }
 
 #[test]

@@ -191,6 +191,14 @@ pub fn find(
         let fastest = near_fastest(&times, NEAR).into_iter().take(settings.pairs);
         let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
         chosen.extend(&fastest);
+        // What a simpler mesh or a simpler shader would gain alone is there to choose too, however little that is here: one that
+        // is the same at many distances needs no switch. All shaders were seen on the scene's own mesh.
+        let of_meshes = (within.iter().copied()).filter(|pair| pair.shader == first);
+        let of_shaders = order.iter().map(|&shader| Pair { mesh: 0, shader });
+        let of_shaders = of_shaders.filter(|pair| at.seen(*pair).strain(bound) <= 1.0);
+        let least = |a: &Pair, b: &Pair| at.seen(*a).time.total_cmp(&at.seen(*b).time);
+        chosen.extend(of_meshes.min_by(least));
+        chosen.extend(of_shaders.min_by(least));
         near.push(fastest);
         walked.push(Walked {
             distance,
