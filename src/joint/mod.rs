@@ -26,13 +26,13 @@ use crate::scene::Scene;
 use crate::search::{Found, Level, SampleSet, Samples, examine};
 use crate::stability::Battery;
 use crate::time::model::Model;
-use confirm::Confirmer;
+use confirm::{Confirmer, Pieces};
 use lodc_joint::{Monotonicity, NEAR, Pair, Prices, Score, exhaustive, near_fastest, walk};
 use lodc_mesh::Mesh;
 use seen::{At, Candidates};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use table::Table;
+use table::{Run, Table};
 
 /// How pairs are looked for at a distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -207,37 +207,54 @@ pub fn find(
         });
     }
 
-    let mut table = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
     let battery = Battery::new(stand)?;
     let mut confirmer = Confirmer::new(&candidates, Some(&battery).filter(|_| !unstable));
-    let (plan, confirmed) = loop {
-        let plan = table.plan();
-        let mut all = Vec::new();
-        let mut refuted = false;
-        for mut run in table.runs(&plan).into_iter().skip(1) {
-            if run.pair == original {
-                // Of what draws the same, what does it for less.
-                run.pair.shader = first;
-            }
-            match confirmer.judge(&run)? {
-                Ok(level) => all.push((run, level)),
-                Err(by) => {
-                    table.refute(&run, by);
-                    refuted = true;
+    // Once with all of them; and with what meshes have alone, and shaders: which plan is refused first decides what is asked next, so
+    // that the plan of all might come to more than theirs.
+    let whole = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
+    let of_meshes = whole.clone().without(|pair| pair.shader != first);
+    let of_shaders = whole.clone().without(|pair| pair.mesh != 0);
+    let mut best: Option<(Scores, Vec<(Run, Pieces)>)> = None;
+    for mut table in [whole, of_meshes, of_shaders] {
+        let (plan, confirmed) = loop {
+            let plan = table.plan();
+            let mut all = Vec::new();
+            let mut refuted = false;
+            for mut run in table.runs(&plan).into_iter().skip(1) {
+                if run.pair == original {
+                    // Of what draws the same, what does it for less.
+                    run.pair.shader = first;
+                }
+                match confirmer.judge(&run)? {
+                    Ok(level) => all.push((run, level)),
+                    Err(by) => {
+                        table.refute(&run, by);
+                        refuted = true;
+                    }
                 }
             }
-        }
-        if !refuted {
-            break (plan, all);
-        }
-    };
-    let fastest = table.fastest();
-    let paper = table.paper(&near);
-    let scores = Scores {
-        chosen: table.score(&plan),
-        paper: table.score(&paper),
-        fastest: table.score(&fastest),
-    };
+            if !refuted {
+                break (plan, all);
+            }
+        };
+        let chosen = table.score(&plan);
+        best = match best {
+            None => {
+                let (fastest, paper) = (table.fastest(), table.paper(&near));
+                let scores = Scores {
+                    chosen,
+                    paper: table.score(&paper),
+                    fastest: table.score(&fastest),
+                };
+                Some((scores, confirmed))
+            }
+            Some((scores, _)) if chosen.j < scores.chosen.j => {
+                Some((Scores { chosen, ..scores }, confirmed))
+            }
+            kept => kept,
+        };
+    }
+    let (scores, confirmed) = best.expect("there was a plan of all pairs");
 
     let mut levels = vec![JointLevel {
         level: found.levels[0].clone(),

@@ -38,6 +38,7 @@ pub(super) struct Run {
 }
 
 /// What was measured of all pairs.
+#[derive(Clone)]
 pub(super) struct Table<'a> {
     scene: &'a Scene,
     distances: Vec<f64>,
@@ -90,6 +91,16 @@ impl<'a> Table<'a> {
             pairs,
             prices,
         })
+    }
+
+    /// The same without some pairs; the original stays.
+    pub(super) fn without(mut self, is: impl Fn(&Pair) -> bool) -> Self {
+        for (refuted, pair) in self.refuted.iter_mut().zip(&self.pairs).skip(1) {
+            if is(pair) {
+                *refuted = PATIENCE;
+            }
+        }
+        self
     }
 
     fn bins(&self) -> usize {
