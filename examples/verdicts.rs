@@ -100,12 +100,7 @@ fn verdicts(source: &Source, scene: &Scene) -> Result<(String, Vec<String>), Box
     let mut verdicts = Vec::new();
     let mut inputs = original.inputs;
     for (_, level) in found.written() {
-        let mut judged = battery.judge(&level.shader).map_err(said)?;
-        if judged.failures.is_empty() {
-            battery
-                .hunt_into(&level.shader, &mut judged)
-                .map_err(said)?;
-        }
+        let judged = battery.judge_and_hunt(&level.shader).map_err(said)?;
         inputs = inputs.max(judged.inputs);
         let steps = found.exact.recipe.0.iter().chain(&level.recipe.0);
         let recipe = Recipe(steps.cloned().collect());

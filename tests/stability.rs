@@ -15,8 +15,8 @@ use lodc::eval::programs::Stand;
 use lodc::front::Source;
 use lodc::scene::Scene;
 use lodc::search::{SampleSet, Samples};
-use lodc::stability::{Battery, Verdict, Ways};
-use lodc_passes::{Recipe, Stage, all_passes, recipe};
+use lodc::stability::{Asked, Battery, Device, Verdict, Ways};
+use lodc_passes::{Recipe, Shader, Stage, all_passes, recipe};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -110,10 +110,7 @@ fn judged(path: &Path) -> Result<(Kind, bool, String), String> {
         return Ok((case.kind, !says.is_empty(), says.join("\n")));
     }
     let battery = Battery::new(&stand).expect("it runs");
-    let mut judged = battery.judge(&made).expect("it runs");
-    if judged.failures.is_empty() {
-        battery.hunt_into(&made, &mut judged).expect("it runs");
-    }
+    let judged = battery.judge_and_hunt(&made).expect("it runs");
     let says = judged.failures.first().map(|failure| {
         let blamed = battery.blame((&base, &Recipe(steps)), failure);
         format!(
@@ -286,4 +283,69 @@ fn the_worst_inputs_are_written_and_looked_at_again() {
         error.message.contains("no file of recorded inputs"),
         "{error}"
     );
+}
+
+/// A device that calls every other fragment bad where a shader is not the original.
+struct Fussy {
+    original: lodc_passes::Fingerprint,
+}
+
+impl Device for Fussy {
+    fn name(&self) -> &str {
+        "a fussy device"
+    }
+
+    fn bad(&mut self, shaders: &[&Shader], asked: &Asked) -> Option<Vec<Vec<bool>>> {
+        let all = shaders.iter().map(|shader| {
+            let is_other = shader.fingerprint() != self.original;
+            (0..asked.count())
+                .map(|at| is_other && at % 2 == 1)
+                .collect()
+        });
+        Some(all.collect())
+    }
+}
+
+#[test]
+fn what_a_device_alone_fails_on_is_blamed_on_the_step() {
+    let path = Path::new("testdata/stability/guard_that_nothing_needs.wgsl");
+    let source = Source::read(path).unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::read(&source, None).unwrap_or_else(|e| panic!("{e}"));
+    let base = normal_form(&source).expect("it is small");
+    let stage = scene.vertex_stage.as_ref().expect("lodc supplies one");
+    let vertex = Program::compile(&stage.module, 0, &[]).expect("it runs");
+    let stand = Stand {
+        base: &base,
+        vertex: &vertex,
+        scene: &scene,
+    };
+    let set = SampleSet::new(&stand, scene.nearest, Samples::Search).expect("it runs");
+    let facts = set.facts(&base);
+    let mut offered = all_passes().flat_map(|pass| pass.candidates(&base, &facts));
+    let step = offered.find(|step| step.to_string().starts_with("op-removal fs_main.far keep"));
+    let step = step.expect("it is offered");
+    let made = recipe::apply(&base, &step).expect("it was offered");
+    let battery = Battery::new(&stand).expect("it runs");
+    let judged = battery.judge_and_hunt(&made).expect("it runs");
+    assert_eq!(judged.verdict, Verdict::Stable);
+    let mut device = Fussy {
+        original: base.fingerprint(),
+    };
+    let recipe = Recipe(vec![step.clone()]);
+    let mut asked = |shader: &Shader| {
+        let of = (&base, &recipe);
+        let found = battery.on_device(&mut device, of, shader, &judged.near);
+        found.expect("it was asked")
+    };
+    let found = asked(&made);
+    assert!(found.inputs > 1000 && found.fails > 100, "{found:?}");
+    let blamed = found.blamed.expect("it fails");
+    assert_eq!(blamed.candidate, Some((0, step)));
+    let says = blamed.says(&base, &source);
+    assert!(
+        says.starts_with("what is returned is not finite on a fussy device"),
+        "{says}"
+    );
+    let held = asked(&base);
+    assert_eq!((held.fails, held.inputs), (0, found.inputs));
 }

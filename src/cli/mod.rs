@@ -117,6 +117,10 @@ struct StabilityArgs {
     /// Writes the inputs that something fails on to a file
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Hands inputs near trouble to a GPU, too: words of its name
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -387,13 +391,9 @@ struct MeasuringArgs {
 
 impl MeasuringArgs {
     fn measuring(self, record: Option<PathBuf>) -> Result<Measuring> {
-        let program = std::env::current_exe().map_err(|error| {
-            Diagnostic::error("lodc cannot find its own file, which draws in a process of its own")
-                .with_reason(error)
-        })?;
         let effort = Effort::default();
         Ok(Measuring {
-            program,
+            program: program()?,
             #[cfg(feature = "gpu")]
             adapter: self.adapter,
             #[cfg(not(feature = "gpu"))]
@@ -406,6 +406,14 @@ impl MeasuringArgs {
             },
         })
     }
+}
+
+/// The file of lodc itself.
+fn program() -> Result<PathBuf> {
+    std::env::current_exe().map_err(|error| {
+        Diagnostic::error("lodc cannot find its own file, which draws in a process of its own")
+            .with_reason(error)
+    })
 }
 
 /// Where run times come from.
@@ -718,9 +726,21 @@ fn compare(arguments: CompareArgs, all: &[OsString]) -> Result<ExitCode> {
 
 /// Looks for inputs that break a shader or its levels. Exit code 1 when a level fails where the original holds.
 fn stability(arguments: StabilityArgs) -> Result<ExitCode> {
+    #[cfg(feature = "gpu")]
+    let time = match arguments.adapter {
+        Some(adapter) => RunTime::Measured(Measuring {
+            program: program()?,
+            adapter: Some(adapter),
+            ..Measuring::default()
+        }),
+        None => RunTime::default(),
+    };
+    #[cfg(not(feature = "gpu"))]
+    let time = RunTime::default();
     let asked = StabilityRequest {
         request: Request {
             output: arguments.lock,
+            time,
             ..arguments.input.request()?
         },
         replay: arguments.replay,

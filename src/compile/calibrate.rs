@@ -95,7 +95,7 @@ pub fn calibrate(
         let mut watch = match ready.watch(request)? {
             Ok(Some(watch)) => watch,
             Ok(None) => return Err(Diagnostic::error("estimated times calibrate nothing")),
-            Err(untimed) => return Err(no_device(&untimed)),
+            Err(error) => return Err(no_device(&error)),
         };
         if let Some(name) = watch.adapters().first() {
             adapter.clone_from(name);
@@ -179,11 +179,10 @@ pub fn calibrate(
     })
 }
 
-fn no_device(untimed: &Diagnostic) -> Box<Diagnostic> {
-    let mut error = Diagnostic::error("there is nothing to calibrate on");
-    let reason = untimed.message.split_once(": ");
-    error = error.with_reason(reason.map_or(&*untimed.message, |(_, reason)| reason));
-    error.notes.extend(untimed.notes.iter().cloned());
+fn no_device(missing: &Diagnostic) -> Box<Diagnostic> {
+    let error = Diagnostic::error("there is nothing to calibrate on");
+    let mut error = error.with_reason(&missing.message);
+    error.notes.extend(missing.notes.iter().cloned());
     error
 }
 

@@ -11,6 +11,7 @@ use crate::emit::{self, EmitLevel, Form, Output};
 use crate::front::Source;
 use crate::scene::Scene;
 use crate::search::Level;
+use crate::stability::{self, Asked};
 use crate::time::clock::Clock;
 use crate::time::model::{Calibration, Model};
 use crate::time::store::{Key, Recording};
@@ -91,8 +92,8 @@ struct Text {
 }
 
 impl Ready {
-    /// The clock that a request asks for; none where times are estimated. What keeps it from being used is a warning: the
-    /// search goes on with estimates.
+    /// The clock that a request asks for; none where times are estimated. What keeps it from being used comes by itself: a search goes
+    /// on with estimates.
     pub(super) fn watch(
         &self,
         request: &Request,
@@ -127,12 +128,12 @@ impl Ready {
                     let adapters = vec![device.recording.adapter.clone()];
                     Ok(Some(watch(adapters, Taken::Device(Box::new(device)))))
                 }
-                Err(error) => Err(untimed(&error)),
+                Err(error) => Err(error),
             }),
             #[cfg(not(feature = "gpu"))]
             RunTime::Measured(_) => {
                 let error = Diagnostic::error("this lodc was built without the feature `gpu`");
-                Ok(Err(untimed(&error)))
+                Ok(Err(error))
             }
         }
     }
@@ -184,7 +185,12 @@ impl Ready {
 #[cfg(feature = "gpu")]
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(120);
 
-fn untimed(error: &Diagnostic) -> Box<Diagnostic> {
+#[cfg(feature = "gpu")]
+fn unwritten(error: &std::io::Error) -> String {
+    format!("a texture cannot be written for the device: {error}")
+}
+
+pub(super) fn untimed(error: &Diagnostic) -> Box<Diagnostic> {
     let mut warning = Diagnostic::warning(format!(
         "nothing was timed, and all times are estimated: {}",
         error.message
@@ -194,6 +200,24 @@ fn untimed(error: &Diagnostic) -> Box<Diagnostic> {
 }
 
 impl Watch<'_> {
+    /// A variant as a text of its own, where it can be written.
+    fn text(&mut self, shader: &Shader) -> Option<Text> {
+        let text = emit::variant(self.source, shader).and_then(|(text, textures)| {
+            Ok(Text {
+                text,
+                auto_lod: None,
+                made: textures::make(self.scene, &textures)?,
+            })
+        });
+        match text {
+            Ok(text) => Some(text),
+            Err(error) => {
+                self.problems.insert(error.message);
+                None
+            }
+        }
+    }
+
     /// Times texts against the original at a distance; for each one timing for each adapter, or none at all.
     fn take(&mut self, texts: &[Option<Text>], distance: f64) -> Vec<Vec<Timing>> {
         let drawn = self.drawn.to_string();
@@ -385,24 +409,61 @@ impl Clock for Watch<'_> {
     }
 
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>> {
-        let mut texts = Vec::new();
-        for shader in variants {
-            let text = emit::variant(self.source, shader).and_then(|(text, textures)| {
-                Ok(Text {
-                    text,
-                    auto_lod: None,
-                    made: textures::make(self.scene, &textures)?,
-                })
-            });
-            texts.push(match text {
-                Ok(text) => Some(text),
-                Err(error) => {
-                    self.problems.insert(error.message);
+        let texts: Vec<Option<Text>> = variants.iter().map(|shader| self.text(shader)).collect();
+        self.take(&texts, distance)
+    }
+
+    fn device(&mut self) -> Option<&mut dyn stability::Device> {
+        Some(self)
+    }
+}
+
+impl stability::Device for Watch<'_> {
+    fn name(&self) -> &str {
+        self.adapters.first().map_or("a device", String::as_str)
+    }
+
+    fn bad(&mut self, shaders: &[&Shader], asked: &Asked) -> Option<Vec<Vec<bool>>> {
+        let texts: Option<Vec<Text>> = shaders.iter().map(|shader| self.text(shader)).collect();
+        let texts = texts?;
+        let json = serde_json::to_vec(asked).unwrap_or_default();
+        let drawn = self.drawn.to_string();
+        let keys = texts
+            .iter()
+            .map(|text| Key::of([drawn.as_bytes(), text.text.as_bytes(), &json]));
+        let keys: Vec<Key> = keys.collect();
+        match &mut self.taken {
+            Taken::Recordings(recordings) => {
+                let of_text = |key: &Key| {
+                    let mut bad = vec![false; asked.count()];
+                    let known = recordings.iter().filter_map(|of| of.bad.get(key));
+                    for at in known.flatten() {
+                        if let Some(bad) = bad.get_mut(*at as usize) {
+                            *bad = true;
+                        }
+                    }
+                    bad
+                };
+                Some(keys.iter().map(of_text).collect())
+            }
+            #[cfg(feature = "gpu")]
+            Taken::Device(device) => match device.feed(&texts, asked) {
+                Ok(bad) => {
+                    for (key, bad) in keys.into_iter().zip(bad.iter().flatten()) {
+                        let bad = (0..).zip(bad).filter(|(_, bad)| **bad).map(|(at, _)| at);
+                        let bad: Vec<u32> = bad.collect();
+                        if !bad.is_empty() {
+                            device.recording.bad.insert(key, bad);
+                        }
+                    }
+                    bad
+                }
+                Err(problem) => {
+                    self.problems.insert(problem);
                     None
                 }
-            });
+            },
         }
-        self.take(&texts, distance)
     }
 }
 
@@ -425,6 +486,20 @@ impl Device {
             auto_lod: text.auto_lod,
             made,
         })
+    }
+
+    /// Which inputs are bad, for each text; or why it is not known.
+    fn feed(
+        &mut self,
+        texts: &[Text],
+        asked: &Asked,
+    ) -> std::result::Result<Option<Vec<Vec<bool>>>, String> {
+        let variants = texts.iter().map(|text| self.variant(text));
+        let variants: std::io::Result<Vec<Variant>> = variants.collect();
+        let variants = variants.map_err(|error| unwritten(&error))?;
+        let adapter = self.measuring.adapter.as_deref();
+        let bad = self.worker.feed(&self.subject, &variants, asked);
+        bad.map_err(|failure| failure.diagnostic(adapter).message)
     }
 
     fn take(
@@ -452,9 +527,7 @@ impl Device {
             match self.variant(text) {
                 Ok(variant) => variants.push(variant),
                 Err(error) => {
-                    problems.insert(format!(
-                        "a texture cannot be written for the device: {error}"
-                    ));
+                    problems.insert(unwritten(&error));
                     return timings
                         .into_iter()
                         .map(|timing| timing.into_iter().collect())

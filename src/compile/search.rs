@@ -1,6 +1,6 @@
 //! Compiling with a search: read, normalise, resolve the scene, search, emit, lock, report.
 
-use super::clock::Timings;
+use super::clock::{Timings, untimed};
 #[cfg(feature = "mesh")]
 use super::joint;
 use super::{Files, Request, normal_form, relative, textures};
@@ -233,7 +233,7 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let kept = ready.kept(request)?;
     let (mut watch, untimed) = match ready.watch(request)? {
         Ok(watch) => (watch, None),
-        Err(warning) => (None, Some(warning)),
+        Err(error) => (None, Some(untimed(&error))),
     };
     let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
     let mut found = search::find(&stand, (request.exact, &kept), clock, progress)

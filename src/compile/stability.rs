@@ -4,7 +4,7 @@ use super::Request;
 use super::search::Ready;
 use crate::emit::Lock;
 use crate::eval::refusal;
-use crate::stability::{Battery, Blamed, Hostile, Judged, Reach, Stiff, Verdict, Ways};
+use crate::stability::{self, Battery, Blamed, Hostile, Judged, Reach, Stiff, Verdict, Ways};
 use crate::{Diagnostic, Result};
 use lodc_passes::Recipe;
 use std::fmt::Write;
@@ -19,6 +19,20 @@ pub struct StabilityRequest {
     pub replay: Option<PathBuf>,
     /// A file for the inputs that something fails on.
     pub record: Option<PathBuf>,
+}
+
+/// What a device made of a level.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum OnDevice {
+    /// It was asked.
+    Asked {
+        /// About so many inputs.
+        inputs: usize,
+        /// The level fails on so many of them, and the original does not.
+        fails: usize,
+    },
+    /// It cannot be asked: its shader takes more than single numbers from its vertices, or fills parameters.
+    Unasked,
 }
 
 /// What was found.
@@ -36,6 +50,8 @@ pub struct Stability {
     pub stiff: Vec<Box<Diagnostic>>,
     /// What should be known besides.
     pub warnings: Vec<Box<Diagnostic>>,
+    /// The device that was asked, and what it made of each level; nothing where none was wanted, or none was there.
+    pub device: Option<(String, Vec<(f32, OnDevice)>)>,
     /// What is to be written.
     pub files: super::Files,
 }
@@ -54,13 +70,33 @@ impl Stability {
                 let _ = writeln!(told, "  {title:<16}{}", hostile.says());
             }
         }
+        if let Some((name, levels)) = &self.device {
+            let _ = writeln!(told, "  on {name}");
+            for (autolod, found) in levels {
+                let title = format!("autoLOD {autolod}");
+                let says = match found {
+                    OnDevice::Asked { inputs, fails: 0 } => {
+                        format!("finite on all of {inputs} inputs on which the original is")
+                    }
+                    OnDevice::Asked { inputs, fails } => {
+                        format!(
+                            "not finite on {fails} of {inputs} inputs, on which the original is"
+                        )
+                    }
+                    OnDevice::Unasked => "single inputs cannot be handed to it".to_owned(),
+                };
+                let _ = writeln!(told, "  {title:<16}{says}");
+            }
+        }
         text + &told
     }
 
     /// Whether a level fails where the original holds.
     pub fn fails(&self) -> bool {
         let mut levels = self.levels.iter();
+        let mut on_device = self.device.iter().flat_map(|(_, levels)| levels);
         levels.any(|(_, judged)| judged.verdict == Verdict::Unstable)
+            || on_device.any(|(_, found)| matches!(found, OnDevice::Asked { fails: 1.., .. }))
     }
 }
 
@@ -87,6 +123,11 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
     let stiffness = |stiff: &Stiff| stiff.diagnostic(&ready.base, &ready.source);
     let mut stiff: Vec<Box<Diagnostic>> = ways.of_original().iter().map(stiffness).collect();
     let mut worst: Vec<_> = lint.into_iter().map(|(_, failure)| failure).collect();
+    let own = ready.scene.warnings.iter().cloned();
+    let mut warnings: Vec<Box<Diagnostic>> = own.map(Box::new).collect();
+    // Whoever names an adapter wants that one.
+    let mut watch = ready.watch(request)??;
+    let mut on_device = Vec::new();
     let mut levels = Vec::new();
     let mut hostile = vec![battery.hostile_inputs(&ready.base).map_err(refused)?];
     if request.lock().is_file() {
@@ -94,18 +135,25 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
         let name = request.lock().display().to_string();
         let shaders = lock.replay(&ready.base, &name, &text)?;
         for (level, emitted) in lock.levels.iter().zip(&shaders) {
-            let mut judged = battery.judge(&emitted.shader).map_err(refused)?;
-            if judged.failures.is_empty() {
-                battery
-                    .hunt_into(&emitted.shader, &mut judged)
-                    .map_err(refused)?;
-            }
+            let judged = battery.judge_and_hunt(&emitted.shader);
+            let judged = judged.map_err(refused)?;
             let steps = lock.exact.0.iter().chain(&level.recipe.0);
             let whole = Recipe(steps.cloned().collect());
             if let Some(failure) = judged.failures.first() {
                 let blamed = battery.blame((&ready.base, &whole), failure);
                 findings.push(diagnostic(&blamed));
                 worst.push(failure.clone());
+            }
+            if let Some(watch) = &mut watch {
+                let of = (&ready.base, &whole);
+                let found = battery.on_device(watch, of, &emitted.shader, &judged.near);
+                let blamed = found.as_ref().and_then(|found| found.blamed.as_ref());
+                findings.extend(blamed.map(&diagnostic));
+                let found = found.map_or(OnDevice::Unasked, |found| OnDevice::Asked {
+                    inputs: found.inputs,
+                    fails: found.fails,
+                });
+                on_device.push((level.autolod, found));
             }
             let changed = ways.compare((&ready.base, &whole), &emitted.shader);
             for changed in changed.map_err(refused)? {
@@ -122,13 +170,17 @@ pub fn stability(asked: &StabilityRequest) -> Result<Stability> {
     if let Some(path) = &asked.record {
         files.push((path.clone(), battery.recorded(&worst).into_bytes()));
     }
+    if let Some(watch) = &watch {
+        warnings.extend(watch.warnings(&[]));
+    }
     Ok(Stability {
         original,
         levels,
         hostile,
         findings,
         stiff,
-        warnings: ready.scene.warnings.iter().cloned().map(Box::new).collect(),
+        warnings,
+        device: watch.map(|watch| (stability::Device::name(&watch).to_owned(), on_device)),
         files,
     })
 }

@@ -6,6 +6,7 @@
 //! Pipeline x Frame --resources, render--> Drawn     colour and coverage, in textures on the device
 //! Drawn --read--> Picture                           as the evaluator gives it
 //! Drawn x Drawn --error--> [TileSum]                what differs, added up on the device
+//! Module x Asked --fed--> what is not finite       on single inputs, past any mesh
 //! Timed x [Timed] --time--> [Timing]                how long they take beside the original
 //! ```
 //!
@@ -19,6 +20,7 @@ mod compute;
 mod depth;
 mod entry;
 pub mod error;
+mod fed;
 mod lavapipe;
 mod opengl;
 mod parameters;
@@ -31,5 +33,6 @@ mod vertices;
 pub mod worker;
 
 pub use adapter::{AdapterLabel, Gpu, list};
+pub use fed::Feeder;
 pub use parameters::parameters;
 pub use render::{Drawn, Pipeline, Renderer, Stages};

@@ -8,7 +8,7 @@ use crate::error::{ErrorFigures, HeldOut, exceeds};
 use crate::eval::program::Refused;
 use crate::scene::{Scene, Split};
 use crate::search::{Level, Measured, Samples, threshold};
-use crate::stability::Battery;
+use crate::stability::{Battery, Judged};
 use lodc_passes::{Recipe, Shader};
 use std::collections::BTreeMap;
 
@@ -33,6 +33,8 @@ pub(super) struct Pieces {
     held_out: HeldOut,
     measured: Measured,
     time: f64,
+    /// How its shader stands, where that was asked.
+    stability: Option<Judged>,
 }
 
 /// Confirms pairs.
@@ -41,8 +43,8 @@ pub(super) struct Confirmer<'a> {
     battery: Option<&'a Battery<'a>>,
     /// What was confirmed, or not, by the pair and the bits of the ends of its interval.
     known: BTreeMap<(usize, usize, u64, u64), Result<Pieces, Refuted>>,
-    /// Whether a shader is stable.
-    stable: BTreeMap<usize, bool>,
+    /// How shaders stand.
+    judged: BTreeMap<usize, Judged>,
 }
 
 impl<'a> Confirmer<'a> {
@@ -52,7 +54,7 @@ impl<'a> Confirmer<'a> {
             candidates,
             battery,
             known: BTreeMap::new(),
-            stable: BTreeMap::new(),
+            judged: BTreeMap::new(),
         }
     }
 
@@ -71,26 +73,34 @@ impl<'a> Confirmer<'a> {
         // What draws the same as the original on its own mesh is there to fall back on.
         let (recipe, _) = &self.candidates.shaders[pair.shader];
         let is_trusted = pair.mesh == 0 && recipe.0.is_empty();
-        let found = match is_trusted || self.is_stable(pair.shader)? {
-            true => self.look(run, is_trusted)?,
-            false => Err(Refuted::Unstable),
+        let stability = match is_trusted {
+            true => None,
+            false => self.stand_of(pair.shader)?,
         };
+        let found = match &stability {
+            Some(judged) if !judged.failures.is_empty() => Err(Refuted::Unstable),
+            _ => self.look(run, is_trusted)?,
+        };
+        let found = found.map(|pieces| Pieces {
+            stability,
+            ..pieces
+        });
         self.known.insert(key, found.clone());
         Ok(found)
     }
 
-    fn is_stable(&mut self, shader: usize) -> Result<bool, Refused> {
+    /// How a shader stands, where that is asked.
+    fn stand_of(&mut self, shader: usize) -> Result<Option<Judged>, Refused> {
         let Some(battery) = self.battery else {
-            return Ok(true);
+            return Ok(None);
         };
-        if let Some(known) = self.stable.get(&shader) {
-            return Ok(*known);
+        if let Some(known) = self.judged.get(&shader) {
+            return Ok(Some(known.clone()));
         }
         let (_, variant) = &self.candidates.shaders[shader];
-        let stable =
-            battery.judge(variant)?.failures.is_empty() && battery.hunt(variant)?.1.is_none();
-        self.stable.insert(shader, stable);
-        Ok(stable)
+        let judged = battery.judge_and_hunt(variant)?;
+        self.judged.insert(shader, judged.clone());
+        Ok(Some(judged))
     }
 
     fn look(&self, run: &Run, is_trusted: bool) -> Result<Result<Pieces, Refuted>, Refused> {
@@ -133,6 +143,7 @@ impl<'a> Confirmer<'a> {
             held_out: HeldOut::new(&details, original),
             time: self.candidates.time(pair.mesh, &start, &measured)?,
             measured,
+            stability: None,
         }))
     }
 }
@@ -161,7 +172,7 @@ impl Pieces {
             branching: Vec::new(),
             with_parameters: None,
             with_textures: None,
-            stability: None,
+            stability: self.stability,
             unstable: Vec::new(),
             stiff: Vec::new(),
             error_after: Vec::new(),

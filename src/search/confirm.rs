@@ -12,7 +12,7 @@ use crate::error::{Details, exceeds};
 use crate::eval::program::Refused;
 use crate::eval::programs::{Programs, Stand};
 use crate::scene::Split;
-use crate::stability::{Battery, Failure};
+use crate::stability::{Battery, Device, Failure};
 use lodc_passes::{Recipe, Shader};
 
 /// The samples of one interval.
@@ -167,21 +167,32 @@ impl<'a> Checks<'a> {
         Ok(verdict)
     }
 
-    /// Hunts for an input on which what was confirmed fails, and why it does.
-    pub(super) fn hunt(&self, found: &Confirmed) -> Result<Option<Struck>, Refused> {
+    /// Hunts for an input on which what was confirmed fails, and why it does; on a device, too, where there is one.
+    pub(super) fn hunt(
+        &self,
+        found: &Confirmed,
+        device: Option<&mut dyn Device>,
+    ) -> Result<Option<Struck>, Refused> {
         let Some(battery) = self.battery else {
             return Ok(None);
         };
         let Ok(shader) = found.recipe.replay(self.base) else {
             return Ok(None);
         };
-        let (_, failure) = battery.hunt(&shader)?;
-        let struck = failure.map(|failure| {
+        let hunt = battery.hunt(&shader)?;
+        if let Some(failure) = hunt.failure {
             let struck = self.struck(&found.recipe, &failure);
             battery.remember(failure);
-            struck
-        });
-        Ok(struck.flatten())
+            return Ok(struck);
+        }
+        let recipe = &found.recipe;
+        let on_device = device
+            .and_then(|device| battery.on_device(device, (self.base, recipe), &shader, &hunt.near));
+        let blamed = on_device.and_then(|found| found.blamed);
+        Ok(blamed.map(|blamed| Struck {
+            recipe: recipe.clone(),
+            blamed,
+        }))
     }
 
     /// Why a variant fails on an input.

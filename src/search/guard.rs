@@ -12,7 +12,7 @@ use crate::error::Details;
 use crate::eval::program::Refused;
 use crate::eval::programs::{Programs, Stand};
 use crate::stability::{Battery, Failure};
-use lodc_passes::{Recipe, Shader};
+use lodc_passes::{Candidate, Recipe, Shader};
 use std::sync::{Mutex, PoisonError};
 
 /// How many tiles of one distance are kept of a variant.
@@ -38,6 +38,8 @@ pub(crate) struct Guard<'a> {
     levels: Vec<Shader>,
     /// What a variant has to hold beyond the pictures.
     battery: Option<&'a Battery<'a>>,
+    /// Steps that fail on a device.
+    forbidden: Vec<Candidate>,
     /// Variants that did not, with what they fail on: one for each last step, and not many.
     unstable: Mutex<Vec<(Recipe, Failure)>>,
 }
@@ -52,6 +54,7 @@ impl<'a> Guard<'a> {
             limit: 1.0,
             levels: Vec::new(),
             battery: None,
+            forbidden: Vec::new(),
             unstable: Mutex::default(),
         }
     }
@@ -67,6 +70,11 @@ impl<'a> Guard<'a> {
             limit: f64::INFINITY,
             ..Self::new(stand, kept)
         }
+    }
+
+    /// From now on no variant may have this step.
+    pub(crate) fn forbid(&mut self, step: Candidate) {
+        self.forbidden.push(step);
     }
 
     /// From now on a level is to stand beside another one.
@@ -101,6 +109,7 @@ impl<'a> Guard<'a> {
     /// Whether nothing that is known speaks against a variant and the shader that it makes.
     pub(crate) fn allows(&self, recipe: &Recipe, shader: &Shader, measured: &Measured) -> bool {
         self.admits(measured)
+            && !recipe.0.iter().any(|step| self.forbidden.contains(step))
             && self.kept.holds(shader)
             && self.has_room(shader)
             && Programs::of(shader).is_ok_and(|programs| {

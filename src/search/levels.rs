@@ -288,9 +288,15 @@ impl<'a> Chain<'a> {
         bottom.find(&base, starts.clone())?;
         for hunts in 1.. {
             let found = bottom.found.as_ref();
-            let Some(struck) = found.map(|found| checks.hunt(found)).transpose()?.flatten() else {
+            let device = times.as_mut().and_then(|times| times.clock.device());
+            let struck = found.map(|found| checks.hunt(found, device)).transpose()?;
+            let Some(struck) = struck.flatten() else {
                 break;
             };
+            if let (Some(_), Some((_, step))) = (&struck.blamed.device, &struck.blamed.candidate) {
+                // No input that the evaluator runs tells this of others.
+                bottom.guard.forbid(step.clone());
+            }
             bottom.struck.push(struck);
             bottom.found = None;
             if hunts == HUNTS {
@@ -541,10 +547,7 @@ fn stand_of(battery: &Battery<'_>, exact: &Exact, level: &mut Level) -> Result<(
     if level.is_original {
         level.stability = Some(battery.original_alone());
     } else if level.stability.is_none() {
-        let mut judged = battery.judge(&level.shader)?;
-        if judged.failures.is_empty() {
-            battery.hunt_into(&level.shader, &mut judged)?;
-        }
+        let judged = battery.judge_and_hunt(&level.shader)?;
         let recipe = derivation(exact, level);
         let first = judged.failures.first();
         let blamed = first.map(|failure| battery.blame((battery.base(), &recipe), failure));

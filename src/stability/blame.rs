@@ -53,11 +53,27 @@ pub struct Blamed {
     pub rounded: bool,
     /// What is worse than in the original, where nothing that is returned is bad.
     pub breach: Option<Breach>,
+    /// The device on which alone it fails.
+    pub device: Option<String>,
 }
 
 impl Battery<'_> {
     /// Finds out why a shader fails. `from` is what its recipe is replayed on.
-    pub fn blame(&self, (from, recipe): (&Shader, &Recipe), failure: &Failure) -> Blamed {
+    pub fn blame(&self, whole: (&Shader, &Recipe), failure: &Failure) -> Blamed {
+        let exhibit = &*self.exhibit_of(failure);
+        self.blame_by(whole, failure, &mut |shader| {
+            let subject = Programs::of(shader).map(Subject::new);
+            subject.is_ok_and(|subject| self.fails_on(&subject, shader, exhibit, failure))
+        })
+    }
+
+    /// The same, where something else says whether a shader fails on the input.
+    pub(super) fn blame_by(
+        &self,
+        (from, recipe): (&Shader, &Recipe),
+        failure: &Failure,
+        fails: &mut dyn FnMut(&Shader) -> bool,
+    ) -> Blamed {
         let exhibit = &*self.exhibit_of(failure);
         let mut shaders = vec![from.clone()];
         for candidate in &recipe.0 {
@@ -67,10 +83,6 @@ impl Battery<'_> {
                 Err(_) => break,
             }
         }
-        let fails = |shader: &Shader| {
-            let subject = Programs::of(shader).map(Subject::new);
-            subject.is_ok_and(|subject| self.fails_on(&subject, shader, exhibit, failure))
-        };
         let holds = shaders.iter().rposition(|shader| !fails(shader));
         let candidate = holds.and_then(|at| Some((at, recipe.0.get(at)?.clone())));
         let failing = &shaders[shaders.len() - 1];
@@ -136,6 +148,7 @@ impl Battery<'_> {
             reach: exhibit.reach(),
             rounded: arithmetic != Arithmetic::OWN,
             breach: failure.law.as_ref().map(|broken| broken.breach),
+            device: None,
         };
         let Ok(programs) = Programs::of(shader) else {
             return blamed;
@@ -341,6 +354,9 @@ impl Blamed {
 
     fn what(&self) -> String {
         let (operation, _) = self.wants;
+        if let Some(device) = &self.device {
+            return format!("what is returned is not finite on {device}");
+        }
         match (self.breach, self.narrow) {
             (Some(Breach::Sign), _) => "a divisor crosses 0".to_owned(),
             (Some(Breach::Margin { .. }), _) => {
@@ -371,6 +387,9 @@ impl Blamed {
             false => format!("given {}; ", given.join(", ")),
         };
         let remark = match self.breach {
+            _ if self.device.is_some() => {
+                "the evaluator gives a number here, and the original does on both".to_owned()
+            }
             Some(Breach::Sign) => {
                 "the divisor changes its sign, which it does not in the original".to_owned()
             }

@@ -16,7 +16,7 @@ pub struct Fed {
 }
 
 impl Fed {
-    fn of(given: &Given<'_>, lanes: impl Iterator<Item = (usize, usize)>) -> Self {
+    pub(super) fn of(given: &Given<'_>, lanes: impl Iterator<Item = (usize, usize)>) -> Self {
         let inputs = lanes.map(|(block, lane)| {
             let mut input = BTreeMap::<u32, Vec<f32>>::new();
             for (slot, words) in given.slots.iter().zip(&given.blocks[block].inputs) {

@@ -7,7 +7,7 @@
 use super::inputs::{Group, Interface, Quad};
 use super::obligations::{Least, Margins, Place, is_sum};
 use super::run::{Failure, Subject, shade};
-use super::{Battery, Inputs, Reach};
+use super::{Asked, Battery, Inputs, Reach};
 use crate::eval::program::Refused;
 use crate::eval::programs::Programs;
 use crate::scene::chance::child;
@@ -26,6 +26,27 @@ const CANCELLING: usize = 8;
 const LEFT: f64 = 0.01;
 /// Stands for what is returned.
 const RETURNED: Place = (u32::MAX, Op::Neg);
+
+/// What a hunt gives.
+#[derive(Clone, Debug)]
+pub struct Hunt {
+    /// How many inputs it looked at.
+    pub inputs: u64,
+    /// The one on which the shader fails and the original does not.
+    pub failure: Option<Failure>,
+    /// Where there is none, what brought each operation the closest to trouble.
+    pub near: Asked,
+}
+
+impl Hunt {
+    fn ended(inputs: u64, failure: Failure) -> Self {
+        Self {
+            inputs,
+            failure: Some(failure),
+            near: Asked::default(),
+        }
+    }
+}
 
 /// The closest to trouble that an operation was brought.
 struct Closest {
@@ -85,7 +106,7 @@ impl Battery<'_> {
     ///
     /// # Errors
     /// When the evaluator refuses it.
-    pub fn hunt(&self, shader: &Shader) -> Result<(u64, Option<Failure>), Refused> {
+    pub fn hunt(&self, shader: &Shader) -> Result<Hunt, Refused> {
         let subject = Subject::new(Programs::of(shader)?);
         let indexed = indexed(shader);
         let mut hunted = Hunted {
@@ -115,13 +136,14 @@ impl Battery<'_> {
                 if self.look(&subject, &near, &mut hunted)
                     && let Some(failure) = self.failure_of(&subject, &near, 1)
                 {
-                    return Ok((inputs, Some(failure)));
+                    return Ok(Hunt::ended(inputs, failure));
                 }
             }
         }
         // What came the closest is asked of every arithmetic.
         let (late, early): (Vec<_>, Vec<_>) =
             hunted.closest.iter().partition(|(place, _)| is_late(place));
+        let mut near = Vec::new();
         for (_, Closest { group, quad, .. }) in early.into_iter().chain(late) {
             let alone = Group {
                 quads: vec![quad.clone()],
@@ -129,10 +151,15 @@ impl Battery<'_> {
             };
             inputs += 4;
             if let Some(failure) = self.failure_of(&subject, &alone, self.arithmetics.len()) {
-                return Ok((inputs, Some(failure)));
+                return Ok(Hunt::ended(inputs, failure));
             }
+            near.push(alone);
         }
-        Ok((inputs, None))
+        Ok(Hunt {
+            inputs,
+            failure: None,
+            near: Asked(near),
+        })
     }
 
     /// Where a subject fails in a group and the original does not, under the first few arithmetics.

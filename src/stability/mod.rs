@@ -4,6 +4,7 @@
 //! Scene x interface --inputs--> exhibits          what pictures show, and what the interface allows beyond them
 //! original, variant x exhibit --run, rounding--> which fragments are not finite, under nine arithmetics
 //! variant x exhibits --hunt--> new exhibits       inputs that go down on the margins of obligations
+//! variant x inputs near trouble --asked--> whether a device fails on them
 //! failure x recipe --blame--> candidate, operation, input, value in f32 and f64
 //! ```
 //!
@@ -14,6 +15,7 @@
 //! How often something happens is not proved by not seeing it: with n inputs and no failure the rate is below 3/n at 95 %
 //! confidence, for inputs like these (Hanley and Lippman-Hand, "If nothing goes wrong, is everything all right?", 1983).
 
+mod asked;
 mod blame;
 mod fed;
 mod hostile;
@@ -24,9 +26,11 @@ mod obligations;
 mod run;
 mod stiff;
 
+pub use asked::{Asked, Device, OnDevice};
 pub use blame::{Blamed, Number};
 pub use fed::Fed;
 pub use hostile::Hostile;
+pub use hunt::Hunt;
 pub use law::Breach;
 pub use run::Failure;
 pub use stiff::{Change, Stiff, Ways};
@@ -149,6 +153,8 @@ pub struct Judged {
     pub of_original: u64,
     /// Where it fails and the original does not; one for each arithmetic and each place in the shader at most.
     pub failures: Vec<Failure>,
+    /// What a hunt found near trouble: for a device to be asked about.
+    pub near: Asked,
 }
 
 impl Judged {
@@ -297,6 +303,7 @@ impl<'a> Battery<'a> {
             inputs: self.inputs(),
             of_original,
             failures,
+            near: Asked::default(),
         })
     }
 
@@ -339,6 +346,7 @@ impl<'a> Battery<'a> {
             inputs: self.inputs(),
             of_original,
             failures: Vec::new(),
+            near: Asked::default(),
         }
     }
 
@@ -377,18 +385,22 @@ impl<'a> Battery<'a> {
         found
     }
 
-    /// Hunts for inputs against a shader, and adds what is found to what was judged.
+    /// Holds a shader against all inputs, and hunts for others where it holds all of these.
     ///
     /// # Errors
     /// When the evaluator refuses it.
-    pub fn hunt_into(&self, shader: &Shader, judged: &mut Judged) -> Result<(), Refused> {
-        let (inputs, failure) = self.hunt(shader)?;
-        judged.inputs += inputs;
-        if let Some(failure) = failure {
-            judged.verdict = Verdict::Unstable;
-            judged.failures.push(failure);
+    pub fn judge_and_hunt(&self, shader: &Shader) -> Result<Judged, Refused> {
+        let mut judged = self.judge(shader)?;
+        if judged.failures.is_empty() {
+            let hunt = self.hunt(shader)?;
+            judged.inputs += hunt.inputs;
+            judged.near = hunt.near;
+            if let Some(failure) = hunt.failure {
+                judged.verdict = Verdict::Unstable;
+                judged.failures.push(failure);
+            }
         }
-        Ok(())
+        Ok(judged)
     }
 
     /// The inputs of failures as a file that [`Self::replay`] reads. One that a picture shows is not in it: the scene has it.

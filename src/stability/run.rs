@@ -34,6 +34,30 @@ impl Subject {
             None => stand.vertex,
         }
     }
+
+    /// The fragments of a group of made inputs, of which `own` is what uniforms and textures hold.
+    pub(crate) fn given<'f>(
+        &self,
+        stand: &Stand<'_>,
+        own: &'f Frame,
+        group: &Group,
+        watcher: Option<&mut dyn Watcher<f32>>,
+    ) -> Given<'f> {
+        let (frame, _) = self.programs.bound(own);
+        let fragment = &self.programs.fragment;
+        // The stage that lodc supplies has its buffer where a variant may have something else.
+        let of_vertices = match self.own_vertex {
+            true => &*frame,
+            false => own,
+        };
+        let spots = Interface::spots(group);
+        let blocks = on_spots(self.vertex(stand), fragment, of_vertices, &spots, watcher);
+        Given {
+            frame,
+            blocks,
+            slots: fragment.inputs().to_vec(),
+        }
+    }
 }
 
 /// Which fragments of an exhibit are bad, block by block.
@@ -134,10 +158,10 @@ impl Battery<'_> {
         exhibit: &'f Exhibit,
         watcher: Option<&mut dyn Watcher<f32>>,
     ) -> Given<'f> {
-        let (frame, _) = subject.programs.bound(&exhibit.frame);
-        let fragment = &subject.programs.fragment;
         match &exhibit.inputs {
             Inputs::Seen(coverage) => {
+                let (frame, _) = subject.programs.bound(&exhibit.frame);
+                let fragment = &subject.programs.fragment;
                 let vertex = subject.vertex(self.stand);
                 let more = match subject.own_vertex {
                     true => Cow::Owned(coverage.with_inputs_of(vertex, fragment, &frame)),
@@ -152,21 +176,7 @@ impl Battery<'_> {
                     },
                 }
             }
-            Inputs::Made(group) => {
-                let spots = Interface::spots(group);
-                let vertex = subject.vertex(self.stand);
-                // The stage that lodc supplies has its buffer where a variant may have something else.
-                let of_vertices = match subject.own_vertex {
-                    true => &*frame,
-                    false => &exhibit.frame,
-                };
-                let blocks = on_spots(vertex, fragment, of_vertices, &spots, watcher);
-                Given {
-                    frame,
-                    blocks,
-                    slots: fragment.inputs().to_vec(),
-                }
-            }
+            Inputs::Made(group) => subject.given(self.stand, &exhibit.frame, group, watcher),
         }
     }
 

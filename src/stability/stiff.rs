@@ -15,15 +15,15 @@
 
 use super::blame::{Number, names, span_of};
 use super::inputs::{Group, Interface, QUADS, Way};
-use super::run::{Given, Subject, fed};
+use super::run::{Given, Subject, shade};
 use super::{obligations::Place, path_of};
 use crate::Diagnostic;
 use crate::error::{displayed, encoded};
 use crate::eval::lane::{LANES, Mask, Words};
-use crate::eval::machine::{Machine, Outcome, Watcher};
+use crate::eval::machine::{Outcome, Watcher};
 use crate::eval::program::{Refused, Slot};
 use crate::eval::programs::{Programs, Stand};
-use crate::eval::raster::{Block, on_spots};
+use crate::eval::raster::Block;
 use crate::front::Source;
 use lodc_passes::semantics::Op;
 use lodc_passes::{Candidate, Recipe, Shader, Stage};
@@ -330,25 +330,10 @@ impl<'a> Ways<'a> {
 
     fn given(&self, subject: &Subject, group: &Group) -> Given<'static> {
         let own = self.interface.frame(group);
-        let (bound, _) = subject.programs.bound(&own);
-        // The stage that lodc supplies has its buffer where a variant may have something else.
-        let of_vertices = match subject.programs.vertex.is_some() {
-            true => &*bound,
-            false => &own,
-        };
-        let fragment = &subject.programs.fragment;
-        let spots = Interface::spots(group);
-        let blocks = on_spots(
-            subject.vertex(self.stand),
-            fragment,
-            of_vertices,
-            &spots,
-            None,
-        );
+        let given = subject.given(self.stand, &own, group, None);
         Given {
-            blocks,
-            slots: fragment.inputs().to_vec(),
-            frame: Cow::Owned(bound.into_owned()),
+            frame: Cow::Owned(given.frame.into_owned()),
+            ..given
         }
     }
 
@@ -374,7 +359,7 @@ impl<'a> Ways<'a> {
             let [begin, _] = &drawn.ends;
             let chunks = items.chunks(QUADS).flat_map(|items| {
                 let block = drawn.between(items);
-                let (outputs, alive) = run(subject, begin, &block, None);
+                let (outputs, alive) = shade(&subject.programs.fragment, begin, &block, None);
                 let all = (0..items.len()).map(|k| self.seen(subject, &outputs, alive, 4 * k));
                 all.collect::<Vec<Shown>>()
             });
@@ -391,7 +376,7 @@ impl<'a> Ways<'a> {
             let Some(block) = given.blocks.first() else {
                 continue;
             };
-            let (outputs, alive) = run(subject, &given, block, None);
+            let (outputs, alive) = shade(&subject.programs.fragment, &given, block, None);
             for at in items_here {
                 all[at] = self.seen(subject, &outputs, alive, 4 * items[at].0);
             }
@@ -581,9 +566,10 @@ impl<'a> Ways<'a> {
             height: stretch.height,
             width: stretch.width(),
             times: before / stretch.width(),
-            within: farthest(&[stretch.from, stretch.to].map(&place))
-                .map(|[a, b]| (apart_of(&a, &b), a.name))
-                .map(|(by, name)| (name, by)),
+            within: farthest(&[stretch.from, stretch.to].map(&place)).map(|[a, b]| {
+                let by = apart_of(&a, &b);
+                (a.name, by)
+            }),
             input: place(stretch.middle()),
             moved: None,
             ways: 1,
@@ -593,19 +579,16 @@ impl<'a> Ways<'a> {
     /// The operations of one fragment.
     fn trace(&self, subject: &Subject, drawn: &Drawn<'_>, item: (usize, f64)) -> Vec<Done> {
         let mut trace = Trace::default();
+        let fragment = &subject.programs.fragment;
         if drawn.turns() {
             let given = self.given_at(subject, drawn.way, item.1);
             trace.lane = 4 * item.0;
             if let Some(block) = given.blocks.first() {
-                run(subject, &given, block, Some(&mut trace));
+                shade(fragment, &given, block, Some(&mut trace));
             }
         } else {
-            run(
-                subject,
-                &drawn.ends[0],
-                &drawn.between(&[item]),
-                Some(&mut trace),
-            );
+            let block = drawn.between(&[item]);
+            shade(fragment, &drawn.ends[0], &block, Some(&mut trace));
         }
         trace.done
     }
@@ -680,22 +663,6 @@ impl<'a> Ways<'a> {
         let at = steps.iter().rposition(as_before)?;
         Some((at, recipe.0.get(at)?.clone()))
     }
-}
-
-/// Runs a shader over a block.
-fn run(
-    subject: &Subject,
-    given: &Given<'_>,
-    block: &Block,
-    watcher: Option<&mut dyn Watcher<f32>>,
-) -> (Vec<Words>, Mask) {
-    let program = &subject.programs.fragment;
-    let inputs = fed(program, given, block);
-    let mut outputs = vec![[0; LANES]; program.outputs().len()];
-    let watcher = watcher.map(|watcher| watcher as &mut dyn Watcher<f32>);
-    let mut machine = Machine::watched(program, &given.frame.bindings, block.draw, watcher);
-    let alive = machine.run(&inputs, block.active, block.covered, &mut outputs);
-    (outputs, alive)
 }
 
 /// The original and what each step of a recipe makes of it.

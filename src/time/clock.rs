@@ -6,6 +6,7 @@
 
 use super::Timing;
 use super::model::Model;
+use crate::stability::Device;
 use lodc_passes::Shader;
 
 /// Times variants of one shader in one scene. A search asks it, and knows nothing of devices.
@@ -21,6 +22,11 @@ pub trait Clock {
     /// Times variants against the original at a distance from the eye to the object's centre, in world units. For each one
     /// timing for each adapter; none at all where it could not be timed on one of them.
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>>;
+
+    /// The device that it times on, to be asked about single inputs; nothing where there is none.
+    fn device(&mut self) -> Option<&mut dyn Device> {
+        None
+    }
 }
 
 /// A variant's timing on the adapter where it does worst: the largest ratio. `None` where it was not timed.

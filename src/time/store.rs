@@ -136,6 +136,9 @@ pub struct Recording {
     pub adapter: String,
     /// The timings by their keys.
     pub timings: BTreeMap<Key, Timing>,
+    /// On which inputs variants are not finite there, by keys of both; those that are finite on all are not here.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bad: BTreeMap<Key, Vec<u32>>,
 }
 
 impl Recording {
@@ -146,6 +149,7 @@ impl Recording {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             adapter: adapter.to_owned(),
             timings: BTreeMap::new(),
+            bad: BTreeMap::new(),
         }
     }
 

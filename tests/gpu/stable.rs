@@ -9,179 +9,41 @@ use lodc::eval::lane::{LANES, Mask};
 use lodc::eval::machine::{Machine, Outcome, Watcher};
 use lodc::eval::program::Program;
 use lodc::eval::programs::Stand;
-use lodc::eval::raster::{Attribute, Frame};
 use lodc::eval::shadow::Both;
-use lodc::gpu::{Gpu, Renderer, Stages};
+use lodc::gpu::{Feeder, Gpu, Renderer, Stages};
 use lodc::scene::Scene;
-use lodc::scene::mesh::Mesh;
 use lodc::search::{SampleSet, Samples};
 use lodc::stability::{Battery, Fed};
 use lodc_passes::semantics::Op;
 use lodc_passes::{Shader, Stage, all_passes, recipe};
-use naga::{Binding, Interpolation, Module, Sampling, TypeInner};
+use naga::Module;
 use std::collections::BTreeMap;
-use std::fmt::Write;
-use std::sync::Arc;
 
-/// Cells in a row of a picture: each is a square of 2 x 2 pixels that is given one input, so that nothing varies within a quad.
-const CELLS: usize = 32;
-
-/// How many floats a cell can be given.
-const FLOATS: usize = 15;
-
-/// A fragment stage fed with chosen numbers: a vertex stage that hands over what a mesh holds, and where each number goes.
-struct Feeder {
-    vertex: Module,
-    /// Locations and how many floats each takes, in their order.
-    places: Vec<(u32, usize)>,
+/// A shader's fragment stage.
+fn fragment(shader: &Shader) -> (&Module, usize) {
+    let entry = shader.index(Stage::Fragment).expect("it has one");
+    (shader.module(), entry)
 }
 
-impl Feeder {
-    /// One for a shader; nothing where it asks for more than can be fed, or otherwise than interpolated in perspective.
-    fn of(shader: &Shader) -> Option<Self> {
-        let function = shader.function(Stage::Fragment)?;
-        let module = shader.module();
-        let mut places = BTreeMap::new();
-        let mut add = |binding: &Option<Binding>, ty| match binding {
-            Some(Binding::Location {
-                location,
-                interpolation: None | Some(Interpolation::Perspective),
-                sampling: None | Some(Sampling::Center),
-                ..
-            }) => {
-                let floats = match &module.types[ty].inner {
-                    TypeInner::Scalar(scalar) if scalar.kind == naga::ScalarKind::Float => 1,
-                    TypeInner::Vector { size, scalar }
-                        if scalar.kind == naga::ScalarKind::Float =>
-                    {
-                        *size as usize
-                    }
-                    _ => return None,
-                };
-                places.insert(*location, floats);
-                Some(())
-            }
-            Some(Binding::Location { .. }) => None,
-            _ => Some(()),
-        };
-        for argument in &function.arguments {
-            add(&argument.binding, argument.ty)?;
-            if let TypeInner::Struct { members, .. } = &module.types[argument.ty].inner {
-                for member in members {
-                    add(&member.binding, member.ty)?;
-                }
-            }
-        }
-        let places: Vec<(u32, usize)> = places.into_iter().collect();
-        let count: usize = places.iter().map(|(_, floats)| floats).sum();
-        if count > FLOATS {
-            return None;
-        }
-        let held = [("a", 3), ("b", 2), ("c", 2), ("d", 4), ("e", 4)];
-        let held = held.iter().flat_map(|(name, count)| {
-            ["x", "y", "z", "w"][..*count]
-                .iter()
-                .map(move |c| format!("{name}.{c}"))
-        });
-        let mut held = held.collect::<Vec<_>>().into_iter();
-        let (mut members, mut values) = (String::new(), String::new());
-        for (location, floats) in &places {
-            let ty = match floats {
-                1 => "f32".to_owned(),
-                more => format!("vec{more}f"),
-            };
-            let own: Vec<String> = held.by_ref().take(*floats).collect();
-            let _ = write!(members, "@location({location}) v{location}: {ty}, ");
-            let _ = write!(values, ", {ty}({})", own.join(", "));
-        }
-        let text = format!(
-            "struct Handed {{ @builtin(position) clip: vec4f, {members} }}
-             @vertex fn feed(@location(0) at: vec3f, @location(1) a: vec3f, @location(2) b: vec2f,
-                 @location(3) c: vec2f, @location(4) d: vec4f, @location(5) e: vec4f) -> Handed {{
-                 return Handed(vec4f(at, 1.0){values});
-             }}"
-        );
-        let vertex = naga::front::wgsl::parse_str(&text).expect("it is plain");
-        Some(Self { vertex, places })
-    }
-
-    fn stages<'a>(&'a self, shader: &'a Shader) -> Stages<'a> {
-        let entry = shader.index(Stage::Fragment).expect("it has one");
-        Stages {
-            vertex: (&self.vertex, 0),
-            fragment: (shader.module(), entry),
-            auto_lod: None,
-        }
-    }
-
-    /// A frame whose cells are given these inputs.
-    fn frame(&self, fed: &Fed) -> Frame {
-        let rows = fed.inputs.len().div_ceil(CELLS);
-        let mut mesh = Mesh::default();
-        for (i, input) in fed.inputs.iter().enumerate() {
-            let numbers = self.places.iter().flat_map(|(location, floats)| {
-                let own = input.get(location).into_iter().flatten().copied();
-                own.chain(std::iter::repeat(0.0)).take(*floats)
-            });
-            let mut all = [0.0; FLOATS];
-            for (number, own) in all.iter_mut().zip(numbers) {
-                *number = own;
-            }
-            let first = mesh.positions.len() as u32;
-            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let x = 2.0 * (i % CELLS + x) as f32 / CELLS as f32 - 1.0;
-                let y = 1.0 - 2.0 * (i / CELLS + y) as f32 / rows as f32;
-                mesh.positions.push([x, y, 0.5]);
-                mesh.normals.push([all[0], all[1], all[2]]);
-                mesh.uvs.push([all[3], all[4]]);
-                mesh.second_uvs.push([all[5], all[6]]);
-                mesh.tangents.push([all[7], all[8], all[9], all[10]]);
-                mesh.colours.push([all[11], all[12], all[13], all[14]]);
-            }
-            mesh.indices
-                .extend([0, 2, 1, 1, 2, 3].map(|corner| first + corner));
-        }
-        let attributes = [
-            Attribute::Position,
-            Attribute::Normal,
-            Attribute::Uv,
-            Attribute::SecondUv,
-            Attribute::Tangent,
-            Attribute::Colour,
-        ];
-        Frame {
-            mesh: Arc::new(mesh),
-            attributes: (0..).zip(attributes).collect(),
-            width: 2 * CELLS as u32,
-            height: 2 * rows as u32,
-            offset: [0.0; 2],
-            grid: 1,
-            ..fed.frame.clone()
-        }
-    }
-
-    /// What the evaluator and a GPU give for each input; nothing where either discards it.
-    fn colours(
-        &self,
-        gpu: &Gpu,
-        (shader, scene): (&Shader, &Scene),
-        fed: &Fed,
-    ) -> Vec<Option<[[f32; 4]; 2]>> {
-        let frame = self.frame(fed);
-        let stages = self.stages(shader);
-        let mut renderer = Renderer::new(gpu);
-        let pipeline = pipeline(&renderer, stages, scene);
-        let by_gpu = drawn(&mut renderer, &pipeline, scene, &frame);
-        let by_evaluator = evaluated(&programs(stages), scene, &frame);
-        let cells = (0..fed.inputs.len()).map(|i| {
-            let at = 2 * (i / CELLS) * by_gpu.width as usize + 2 * (i % CELLS);
-            let both = [&by_evaluator, &by_gpu];
-            both.iter()
-                .all(|picture| picture.covered[at] > 0.0)
-                .then(|| both.map(|picture| picture.pixels[at]))
-        });
-        cells.collect()
-    }
+/// What the evaluator and a GPU give for each input; nothing where either discards it.
+fn colours(
+    (gpu, feeder): (&Gpu, &Feeder),
+    (shader, scene): (&Shader, &Scene),
+    fed: &Fed,
+) -> Vec<Option<[[f32; 4]; 2]>> {
+    let frame = feeder.frame(fed);
+    let stages = feeder.stages(fragment(shader));
+    let mut renderer = Renderer::new(gpu);
+    let pipeline = pipeline(&renderer, stages, scene);
+    let by_gpu = drawn(&mut renderer, &pipeline, scene, &frame);
+    let by_evaluator = evaluated(&programs(stages), scene, &frame);
+    let pixels = Feeder::pixels(fed.inputs.len()).map(|at| {
+        let both = [&by_evaluator, &by_gpu];
+        both.iter()
+            .all(|picture| picture.covered[at] > 0.0)
+            .then(|| both.map(|picture| picture.pixels[at]))
+    });
+    pixels.collect()
 }
 
 /// How many numbers of `f32` lie between two numbers: of the size of the first, and as a part of one.
@@ -276,7 +138,7 @@ fn single_operations_are_as_far_from_f64_as_is_said() {
         let subject = written(&format!("operation-{number}"), &text, "object = \"plane\"");
         let (source, scene) = read(&subject.shader);
         let shader = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
-        let feeder = Feeder::of(&shader).expect("it takes two floats");
+        let feeder = Feeder::of(fragment(&shader)).expect("it takes two floats");
         let inputs = (0..4 * LANES).map(|i| {
             let share = [(i % 64) as f32 / 63.0, (i * 37 % 1024) as f32 / 1023.0];
             let number = |c: usize, share: f32| {
@@ -289,7 +151,7 @@ fn single_operations_are_as_far_from_f64_as_is_said() {
             frame: scene.frames(3.0).swap_remove(0),
             inputs: inputs.collect(),
         };
-        let colours = feeder.colours(&gpu, (&shader, &scene), &fed);
+        let colours = colours((&gpu, &feeder), (&shader, &scene), &fed);
         let entry = shader.index(Stage::Fragment).expect("it has one");
         let program = Program::compile(shader.module(), entry, &[]);
         let program = program.unwrap_or_else(|refused| panic!("{}", refused.what));
@@ -357,7 +219,7 @@ fn materials_are_alike_on_inputs_that_no_picture_shows_where_they_are_stable() {
             vertex: &vertex,
             scene: &scene,
         };
-        let (Some(feeder), None) = (Feeder::of(&base), &scene.lighting) else {
+        let (Some(feeder), None) = (Feeder::of(fragment(&base)), &scene.lighting) else {
             println!("{name}: its inputs cannot be fed");
             continue;
         };
@@ -368,11 +230,8 @@ fn materials_are_alike_on_inputs_that_no_picture_shows_where_they_are_stable() {
             if fed.inputs.is_empty() {
                 continue;
             }
-            for [evaluator, gpu] in feeder
-                .colours(&gpu, (&base, &scene), &fed)
-                .into_iter()
-                .flatten()
-            {
+            let colours = colours((&gpu, &feeder), (&base, &scene), &fed);
+            for [evaluator, gpu] in colours.into_iter().flatten() {
                 if evaluator.iter().all(|x| x.is_finite()) && gpu.iter().any(|x| !x.is_finite()) {
                     fails += 1;
                     continue;
@@ -443,7 +302,7 @@ fn what_traps_fail_on_leaves_originals_finite() {
             let step = step.unwrap_or_else(|| panic!("{name}: `{wanted}` is not offered"));
             made = recipe::apply(&made, &step).expect("it was offered");
         }
-        let Some(feeder) = Feeder::of(&base) else {
+        let Some(feeder) = Feeder::of(fragment(&base)) else {
             println!("{name}: its inputs cannot be fed");
             continue;
         };
@@ -456,18 +315,14 @@ fn what_traps_fail_on_leaves_originals_finite() {
             continue;
         }
         let battery = Battery::new(&stand).unwrap_or_else(|refused| panic!("{}", refused.what));
-        let refused = |refused: lodc::eval::program::Refused| -> ! { panic!("{}", refused.what) };
-        let mut judged = battery.judge(&made).unwrap_or_else(|r| refused(r));
-        if judged.failures.is_empty() {
-            let hunted = battery.hunt_into(&made, &mut judged);
-            hunted.unwrap_or_else(|r| refused(r));
-        }
+        let judged = battery.judge_and_hunt(&made);
+        let judged = judged.unwrap_or_else(|refused| panic!("{}", refused.what));
         let Some(failure) = judged.failures.first() else {
             println!("{name}: it fails otherwise");
             continue;
         };
         let fed = battery.fed(failure);
-        let colour = |shader: &Shader| feeder.colours(&gpu, (shader, &scene), &fed)[0];
+        let colour = |shader: &Shader| colours((&gpu, &feeder), (shader, &scene), &fed)[0];
         let finite = |colour: Option<[[f32; 4]; 2]>| {
             colour.map(|both| both.map(|colour| colour.iter().all(|x| x.is_finite())))
         };

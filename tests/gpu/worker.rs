@@ -1,9 +1,12 @@
 //! The child that draws, and what goes wrong with it.
 
-use super::pictures::{drawn, open, pipeline};
+use super::pictures::{drawn, open, pipeline, programs};
 use super::{INTERFACES, bits, read, scratch, written};
+use lodc::compile::normal_form;
+use lodc::eval::programs::Stand;
 use lodc::gpu::worker::{Failure, Subject, Variant, Wanted, Worker};
 use lodc::gpu::{Renderer, Stages};
+use lodc::stability::Battery;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -200,4 +203,36 @@ fn a_child_that_crashes_or_is_none_is_an_error() {
     assert!(!crashed.diagnostic(Some("x")).notes.is_empty());
     let none = picture("/nowhere/lodc");
     assert!(matches!(&none, Failure::NotStarted(_)), "{none:?}");
+}
+
+#[test]
+fn a_child_is_handed_single_inputs() {
+    let Some(_) = open("vulkan") else { return };
+    let guarded = include_str!("../../testdata/stability/normalize_of_what_can_vanish.wgsl");
+    let subject = written("fed", guarded, "");
+    let (source, scene) = read(&subject.shader);
+    let base = normal_form(&source).unwrap_or_else(|e| panic!("{e}"));
+    let (vertex, _) = programs(Stages::of_shader(&base, &scene).expect("it has both stages"));
+    let stand = Stand {
+        base: &base,
+        vertex: &vertex,
+        scene: &scene,
+    };
+    let battery = Battery::new(&stand).expect("it runs");
+    let near = battery.judge_and_hunt(&base).expect("it runs").near;
+    let bare = Variant {
+        text: Some(guarded.replace("max(square, 0.00000001)", "square")),
+        ..Variant::default()
+    };
+    let mut worker = worker("vulkan");
+    let variants = [Variant::default(), bare];
+    let bad = worker.feed(&subject, &variants, &near);
+    let bad = bad.unwrap_or_else(|failure| panic!("{failure:?}"));
+    let bad = bad.expect("they can be fed");
+    let counts = [0, 1].map(|at| bad[at].iter().filter(|bad| **bad).count());
+    assert!(
+        counts[0] == 0 && counts[1] > 0,
+        "{counts:?} of {}",
+        near.count()
+    );
 }

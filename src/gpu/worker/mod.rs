@@ -18,6 +18,7 @@ pub use serve::serve;
 use crate::Diagnostic;
 use crate::diagnostic::Severity;
 use crate::front::{Definition, Modules, Stages};
+use crate::stability::Asked;
 use crate::time::{Effort, Timing};
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
@@ -90,7 +91,7 @@ pub struct Variant {
     /// What `autoLOD` is, where the text has such an override constant.
     pub auto_lod: Option<f64>,
     /// The textures that were made for the text: the names of their variables, and their files. They are bound where it is
-    /// timed; a picture is drawn without them.
+    /// timed or fed; a picture is drawn without them.
     pub made: Vec<(String, PathBuf)>,
 }
 
@@ -130,6 +131,11 @@ enum Task {
         distance: f64,
         effort: Effort,
     },
+    /// Variants are given single inputs.
+    Feed {
+        variants: Vec<Variant>,
+        asked: Asked,
+    },
 }
 
 /// What it says.
@@ -141,6 +147,9 @@ enum Answer {
     Name(String),
     /// What was found of each variant; no numbers are behind it.
     Timed(Vec<Result<Timing, Said>>),
+    /// Whether variants can be given single inputs; for each of them and each input a number is behind it, which is not 0 where what comes
+    /// out is not finite.
+    Fed(bool),
     /// The device cannot, or the input is bad.
     Refused(Said),
 }

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::Diagnostic;
 use crate::eval::image::Picture;
+use crate::stability::Asked;
 use crate::time::{Effort, Timing};
 use std::io::{BufReader, Read};
 use std::path::PathBuf;
@@ -131,7 +132,9 @@ impl Worker {
         let (answer, numbers) = self.ask(subject, task, self.patience)?;
         match answer {
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
-            Answer::Timed(_) | Answer::Name(_) => Err(Failure::Refused(confused())),
+            Answer::Timed(_) | Answer::Fed(_) | Answer::Name(_) => {
+                Err(Failure::Refused(confused()))
+            }
             Answer::Picture { width, height } => {
                 let count = width as usize * height as usize;
                 let (colours, covered) = numbers.split_at(numbers.len().min(4 * count));
@@ -153,6 +156,34 @@ impl Worker {
         let nothing = Subject::default();
         match self.ask(&nothing, Task::Name, self.patience)?.0 {
             Answer::Name(name) => Ok(name),
+            Answer::Refused(said) => Err(Failure::Refused(said.error())),
+            _ => Err(Failure::Refused(confused())),
+        }
+    }
+
+    /// For each variant and each fragment of the inputs, whether what it gives is not finite; nothing where one of them cannot be fed.
+    ///
+    /// # Errors
+    /// As [`Self::picture`].
+    pub fn feed(
+        &mut self,
+        subject: &Subject,
+        variants: &[Variant],
+        asked: &Asked,
+    ) -> Result<Option<Vec<Vec<bool>>>, Failure> {
+        let task = Task::Feed {
+            variants: variants.to_vec(),
+            asked: asked.clone(),
+        };
+        let patience = self.patience * (variants.len() as u32 + 1);
+        let (answer, numbers) = self.ask(subject, task, patience)?;
+        match answer {
+            Answer::Fed(true) if numbers.len() == variants.len() * asked.count() => {
+                let each = numbers.chunks(asked.count().max(1));
+                let each = each.map(|numbers| numbers.iter().map(|x| *x != 0.0).collect());
+                Ok(Some(each.collect()))
+            }
+            Answer::Fed(false) => Ok(None),
             Answer::Refused(said) => Err(Failure::Refused(said.error())),
             _ => Err(Failure::Refused(confused())),
         }

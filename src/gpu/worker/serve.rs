@@ -10,6 +10,7 @@ use crate::front::Source;
 use crate::gpu::time::{Place, Timed};
 use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
 use crate::scene::{Scene, filled};
+use crate::stability::Asked;
 use crate::time::Effort;
 use crate::{Diagnostic, Result};
 use std::io::{Read, Write};
@@ -190,29 +191,36 @@ impl<'g> Loaded<'g> {
             return Ok(timed);
         };
         let source = Source::parse("variant.wgsl", &**text)?;
-        let mut more = Bindings::new();
-        for (name, file) in &variant.made {
-            let mut declared = source.module.global_variables.iter();
-            let declared = declared.find(|(_, declared)| declared.name.as_ref() == Some(name));
-            let binding = declared.and_then(|(_, declared)| declared.binding);
-            let shown = file.display().to_string();
-            let bytes = std::fs::read(file).map_err(|error| {
-                Diagnostic::error(format!("cannot read the texture `{shown}`")).with_reason(error)
-            })?;
-            if let Some(at) = binding {
-                let texture = Arc::new(generated::read(&shown, &bytes)?);
-                more.insert((at.group, at.binding), Resource::Texture(texture));
-            }
-        }
-        Ok(timed.with(more, filled(&source)?))
+        Ok(timed.with(made(&source, variant)?, filled(&source)?))
     }
 
     fn stages<'a>(&'a self, source: &'a Source) -> Result<Stages<'a>> {
-        Stages::of_source(source, &self.scene).ok_or_else(|| {
-            Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
-                .with_note("give it the vertex entry point of the shader")
-        })
+        Stages::of_source(source, &self.scene).ok_or_else(no_vertices)
     }
+}
+
+fn no_vertices() -> Box<Diagnostic> {
+    Diagnostic::error("a variant has no vertex stage, and the scene supplies none")
+        .with_note("give it the vertex entry point of the shader")
+}
+
+/// The textures that were made for a variant, where its text binds them.
+fn made(source: &Source, variant: &Variant) -> Result<Bindings> {
+    let mut more = Bindings::new();
+    for (name, file) in &variant.made {
+        let mut declared = source.module.global_variables.iter();
+        let declared = declared.find(|(_, declared)| declared.name.as_ref() == Some(name));
+        let binding = declared.and_then(|(_, declared)| declared.binding);
+        let shown = file.display().to_string();
+        let bytes = std::fs::read(file).map_err(|error| {
+            Diagnostic::error(format!("cannot read the texture `{shown}`")).with_reason(error)
+        })?;
+        if let Some(at) = binding {
+            let texture = Arc::new(generated::read(&shown, &bytes)?);
+            more.insert((at.group, at.binding), Resource::Texture(texture));
+        }
+    }
+    Ok(more)
 }
 
 fn answer<'g>(
@@ -236,6 +244,7 @@ fn answer<'g>(
             distance,
             effort,
         } => time(&mut loaded, variants, *distance, effort).map(|answer| (answer, Vec::new())),
+        Task::Feed { variants, asked } => feed(&mut loaded, variants, asked),
         Task::Name => Err(Diagnostic::error("it was answered before")),
     };
     *subject = Some(loaded);
@@ -270,6 +279,37 @@ fn draw(
         height: picture.height,
     };
     Ok((answer, numbers))
+}
+
+/// Gives variants single inputs.
+fn feed(
+    loaded: &mut Loaded<'_>,
+    variants: &[Variant],
+    asked: &Asked,
+) -> Result<(Answer, Vec<f32>)> {
+    let mut numbers = Vec::new();
+    for variant in variants {
+        let text = match &variant.text {
+            Some(text) => Some(Source::parse("variant.wgsl", &**text)?),
+            None => None,
+        };
+        let source = text.as_ref().unwrap_or(&loaded.source);
+        // What fills parameters is drawn with, not fed.
+        let bad = match text.is_some() && !source.filled().is_empty() {
+            true => None,
+            false => {
+                let own = Stages::of_source(source, &loaded.scene).ok_or_else(no_vertices)?;
+                let more = made(source, variant)?;
+                let scene = (&loaded.scene, &more);
+                loaded.renderer.bad(own, scene, asked)?
+            }
+        };
+        match bad {
+            Some(bad) => numbers.extend(bad.into_iter().map(|bad| f32::from(u8::from(bad)))),
+            None => return Ok((Answer::Fed(false), Vec::new())),
+        }
+    }
+    Ok((Answer::Fed(true), numbers))
 }
 
 /// Times variants. They are compiled once, as long as they fit into what is kept.
