@@ -68,7 +68,7 @@ fn pairs_become_levels_with_their_meshes() {
     let report = folder.joined(&["--search", "separate"]);
     let joint = &report["joint"];
     let (k, l) = (number(&joint["meshes"]), number(&joint["shaders"]));
-    assert!((2.0..=6.0).contains(&k) && (2.0..=6.0).contains(&l));
+    assert!((2.0..=7.0).contains(&k) && (2.0..=6.0).contains(&l));
     let walked = list(&joint["walked"]);
     assert_eq!(walked.len(), 2);
     for walk in walked {

@@ -5,7 +5,7 @@
 use super::Settings;
 use crate::mesh::{Sequence, Simplifier, Subject, Triangles, Until};
 use crate::search::Found;
-use lodc_mesh::Mesh;
+use lodc_mesh::{Mesh, subdivide};
 use lodc_passes::{Recipe, Shader};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -46,6 +46,17 @@ pub(super) fn meshes(subject: Subject<'_>, settings: &Settings) -> Vec<Arc<Mesh>
         Arc::new(triangles.mesh(original))
     });
     std::iter::once(Arc::clone(original)).chain(made).collect()
+}
+
+/// The most triangles of a finer mesh: where there are more, triangles are small already.
+const MOST_FINER: usize = 200_000;
+
+/// A mesh with four triangles for each of the original's, for shaders that compute at the vertices; nothing where there are none.
+pub(super) fn finer(original: &Mesh, shaders: &[(Recipe, Shader)]) -> Option<Arc<Mesh>> {
+    let mut shaders = shaders.iter();
+    let is_wanted = shaders.any(|(_, shader)| shader.handing_over().is_some());
+    let is_small = 4 * original.indices.len() / 3 <= MOST_FINER;
+    (is_wanted && is_small).then(|| Arc::new(subdivide(original)))
 }
 
 /// Places without those that are like the one before, and with others between them where they are farthest apart, up to so many.

@@ -1,7 +1,7 @@
 //! The joint search: which pairs of a mesh and a shader are worth having, and from which distances on.
 //!
 //! ```text
-//! scene's mesh --candidates--> meshes       worth keeping, of a simplification by pictures
+//! scene's mesh --candidates--> meshes       worth keeping, of a simplification by pictures; and a finer one
 //! Found --candidates--> shaders             of the frontiers of a search on the scene's own mesh
 //! meshes x shaders --walk--> pairs          at each distance, along the boundary of what is within the bound
 //! pairs x distances --seen--> errors, times, and what is seen where one replaces another
@@ -79,8 +79,10 @@ impl Default for Settings {
 pub struct Walked {
     /// From the eye to the object's centre, world units.
     pub distance: f64,
-    /// How many pairs.
+    /// How many pairs, on the way.
     pub pairs: usize,
+    /// How many with a finer mesh than the scene's own, besides.
+    pub finer: usize,
     /// How far their errors were monotone.
     pub monotonicity: Monotonicity,
 }
@@ -112,7 +114,8 @@ pub struct JointLevel {
 pub struct Joint {
     /// The levels, nearest first; the first is the original.
     pub levels: Vec<JointLevel>,
-    /// The meshes that there were to choose from, the scene's own first.
+    /// The meshes that there were to choose from: the scene's own first, then simpler ones, then a finer one, where shaders compute at
+    /// vertices.
     pub meshes: Vec<Arc<Mesh>>,
     /// How many shaders there were.
     pub shaders: usize,
@@ -141,7 +144,11 @@ pub fn find(
         fragment,
         scene,
     };
-    let meshes = candidates::meshes(subject, settings);
+    let mut meshes = candidates::meshes(subject, settings);
+    let shaders = candidates::shaders(stand.base, found, settings.shaders);
+    // Behind those that the walk goes along.
+    let simpler = meshes.len();
+    meshes.extend(candidates::finer(&scene.mesh, &shaders).filter(|_| settings.meshes > 1));
     let scenes: Vec<Scene> = (meshes.iter())
         .map(|mesh| {
             let mut scene = scene.clone();
@@ -156,7 +163,6 @@ pub fn find(
             scene,
         })
         .collect();
-    let shaders = candidates::shaders(stand.base, found, settings.shaders);
     let candidates = Candidates::new(&stands, &shaders, Model::estimated())?;
     // The original as it stands is drawn near by alone: what draws the same for less takes its place.
     let original = Pair { mesh: 0, shader: 0 };
@@ -183,10 +189,23 @@ pub fn find(
         };
         let strain = |pair: Pair| Ok::<_, Refused>(at.seen(pair_of(pair)).strain(bound));
         let walk = match settings.way {
-            Way::Separate => walk(meshes.len(), order.len(), strain)?,
-            Way::Exhaustive => exhaustive(meshes.len(), order.len(), strain)?,
+            Way::Separate => walk(simpler, order.len(), strain)?,
+            Way::Exhaustive => exhaustive(simpler, order.len(), strain)?,
         };
-        let within: Vec<Pair> = walk.within().into_iter().map(pair_of).collect();
+        let mut within: Vec<Pair> = walk.within().into_iter().map(pair_of).collect();
+        // What is interpolated too coarsely on the scene's own mesh may do on a finer one.
+        let coarse = order.iter().filter(|&&shader| {
+            let own = Pair { mesh: 0, shader };
+            candidates.programs[shader].vertex.is_some() && at.seen(own).strain(bound) > 1.0
+        });
+        let finer: Vec<Pair> = (simpler..meshes.len())
+            .flat_map(|mesh| coarse.clone().map(move |&shader| Pair { mesh, shader }))
+            .collect();
+        within.extend(
+            finer
+                .iter()
+                .filter(|pair| at.seen(**pair).strain(bound) <= 1.0),
+        );
         let times: Vec<f64> = within.iter().map(|pair| at.seen(*pair).time).collect();
         let fastest = near_fastest(&times, NEAR).into_iter().take(settings.pairs);
         let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
@@ -203,6 +222,7 @@ pub fn find(
         walked.push(Walked {
             distance,
             pairs: walk.visits.len(),
+            finer: finer.len(),
             monotonicity: walk.monotonicity(),
         });
     }
@@ -261,13 +281,16 @@ pub fn find(
         mesh: 0,
         shown: None,
     }];
-    let mut before = original;
-    for (run, pieces) in confirmed {
+    let (runs, pieces): (Vec<Run>, Vec<Pieces>) = confirmed.into_iter().unzip();
+    let of_runs = runs.iter().zip(pieces).map(|(run, pieces)| {
         let (recipe, shader) = &shaders[run.pair.shader];
         let is_original = first == 0 && run.pair.shader == 0;
-        let mut level = [pieces.level(scene, (recipe, shader), is_original)];
-        examine(stand, (&battery, &found.exact), &mut level)?;
-        let [level] = level;
+        pieces.level(scene, (recipe, shader), is_original)
+    });
+    let mut of_runs: Vec<Level> = of_runs.collect();
+    examine(stand, (&battery, &found.exact), &mut of_runs)?;
+    let mut before = original;
+    for (run, level) in runs.into_iter().zip(of_runs) {
         let last = &levels[levels.len() - 1].level;
         if level.autolod <= last.autolod && levels.len() > 1 {
             // Two thresholds that are the same in hundredths.

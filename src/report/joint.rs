@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct JointReport {
     /// How pairs were looked for: `separate` or `exhaustive`.
     pub search: &'static str,
-    /// How many meshes there were to choose from, with the original.
+    /// How many meshes there were to choose from, with the original and a finer one.
     pub meshes: usize,
     /// How many shaders, with the original.
     pub shaders: usize,
@@ -30,8 +30,10 @@ pub struct JointReport {
 pub struct WalkReport {
     /// In world units.
     pub distance: f64,
-    /// How many pairs.
+    /// How many pairs, on the way.
     pub pairs: usize,
+    /// How many with a finer mesh than the scene's own, besides.
+    pub finer: usize,
     /// Pairs of those of which one is simpler than the other.
     pub compared: usize,
     /// Those of them of which the simpler one has less error.
@@ -74,6 +76,7 @@ impl JointReport {
         let walked = joint.walked.iter().map(|walked| WalkReport {
             distance: walked.distance,
             pairs: walked.pairs,
+            finer: walked.finer,
             compared: walked.monotonicity.compared,
             violated: walked.monotonicity.violated,
             misleading: walked.monotonicity.misleading,
@@ -95,7 +98,8 @@ impl JointReport {
 
     /// A few lines for people.
     pub(super) fn summary(&self) -> String {
-        let looked: usize = self.walked.iter().map(|walked| walked.pairs).sum();
+        let looked = self.walked.iter().map(|walked| walked.pairs + walked.finer);
+        let looked: usize = looked.sum();
         let (compared, violated) = (self.walked.iter()).fold((0, 0), |(c, v), walked| {
             (c + walked.compared, v + walked.violated)
         });
