@@ -94,6 +94,40 @@ impl Place {
 }
 
 #[test]
+fn pairs_of_meshes_and_shaders_are_timed_recorded_and_replayed() {
+    if open("vulkan").is_none() {
+        return;
+    }
+    let place = Place::new("pairs");
+    let scene = SCENE.replace("plane", "torus-knot");
+    let scene = scene.replace("levels = 3", "levels = 2");
+    fs::write(place.0.join("a.toml"), scene).expect("it can be written");
+    let few = ["--search", "separate", "--meshes", "4", "--shaders", "4"];
+    let few = [&few[..], &["--mesh-views", "6"]].concat();
+    place.measured(&[&few[..], &["--record", "times.json"]].concat());
+    let all = ["a.lod.wgsl", "a.lod.toml", "a.lod/a.meshes.toml"];
+    let written = all.map(|file| place.read(file));
+    let report = place.report();
+    let levels = report["levels"].as_array().expect("it has levels");
+    let simpler = levels
+        .iter()
+        .skip(1)
+        .filter(|level| !level["mesh"]["file"].is_null());
+    assert!(simpler.count() > 0, "{levels:?}");
+    for level in &levels[1..] {
+        assert_eq!(level["time"]["kind"], "measured", "{level}");
+    }
+    // A mesh that is simpler takes its own time, and the branch of a shader is timed on one mesh only.
+    assert!(levels[1]["time"]["branching"].is_null(), "{levels:?}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lodc"));
+    let command = command.current_dir(&place.0).arg("a.wgsl").args(&few);
+    let output = command.args(["--recordings", "times.json"]).output();
+    assert!(output.expect("lodc starts").status.success());
+    assert_eq!(all.map(|file| place.read(file)), written);
+    assert_eq!(place.report()["levels"], report["levels"]);
+}
+
+#[test]
 fn a_search_is_recorded_and_replayed_to_the_same_bytes() {
     if open("vulkan").is_none() {
         return;

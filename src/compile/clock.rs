@@ -13,13 +13,16 @@ use crate::scene::Scene;
 use crate::search::Level;
 use crate::stability::{self, Asked};
 use crate::time::clock::Clock;
+use crate::time::handed_over;
 use crate::time::model::{Calibration, Model};
 use crate::time::store::{Key, Recording};
 use crate::time::{Timing, TimingWarning, Verdict};
 use crate::{Diagnostic, Result};
+use lodc_mesh::Mesh;
 use lodc_passes::Shader;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use super::Measuring;
@@ -70,14 +73,14 @@ struct Device {
     cache: Option<Cache>,
     /// All that was timed here.
     recording: Recording,
-    /// Where textures are handed over that were made for variants; it goes with this.
+    /// Where textures and meshes are handed over that were made for variants; it goes with this.
     folder: PathBuf,
 }
 
 #[cfg(feature = "gpu")]
 impl Drop for Device {
     fn drop(&mut self) {
-        // It is there only when a texture was made.
+        // It is there only when something was made.
         let _ = std::fs::remove_dir_all(&self.folder);
     }
 }
@@ -89,6 +92,15 @@ struct Text {
     auto_lod: Option<f64>,
     /// The textures that were made for it.
     made: Vec<Made>,
+    /// The mesh that it is drawn on, where that is not the scene's own.
+    mesh: Option<MeshFile>,
+}
+
+/// A mesh as it is handed to a device.
+#[derive(Clone)]
+struct MeshFile {
+    bytes: Vec<u8>,
+    hash: String,
 }
 
 impl Ready {
@@ -187,7 +199,7 @@ const PATIENCE: std::time::Duration = std::time::Duration::from_secs(120);
 
 #[cfg(feature = "gpu")]
 fn unwritten(error: &std::io::Error) -> String {
-    format!("a texture cannot be written for the device: {error}")
+    format!("a texture or a mesh cannot be written for the device: {error}")
 }
 
 pub(super) fn untimed(error: &Diagnostic) -> Box<Diagnostic> {
@@ -207,6 +219,7 @@ impl Watch<'_> {
                 text,
                 auto_lod: None,
                 made: textures::make(self.scene, &textures)?,
+                mesh: None,
             })
         });
         match text {
@@ -232,7 +245,8 @@ impl Watch<'_> {
                 effort,
             ];
             let made = text.made.iter().map(|made| made.locked.hash.as_bytes());
-            Key::of(fixed.into_iter().chain(made))
+            let mesh = text.mesh.iter().map(|mesh| mesh.hash.as_bytes());
+            Key::of(fixed.into_iter().chain(made).chain(mesh))
         };
         let timings: Vec<Vec<Timing>> = match &mut self.taken {
             Taken::Recordings(recordings) => texts
@@ -297,6 +311,7 @@ impl Watch<'_> {
                 text: text.unwrap_or_default(),
                 auto_lod: None,
                 made: textures::make(self.scene, &textures)?,
+                mesh: None,
             })
         });
         let mut text = match text {
@@ -413,6 +428,24 @@ impl Clock for Watch<'_> {
         self.take(&texts, distance)
     }
 
+    fn time_on(&mut self, pairs: &[(&Arc<Mesh>, &Shader)], distance: f64) -> Vec<Vec<Timing>> {
+        let own = &self.scene.mesh;
+        let mut files: Vec<(&Arc<Mesh>, MeshFile)> = Vec::new();
+        let mut texts = Vec::new();
+        for &(mesh, shader) in pairs {
+            let is_own = Arc::ptr_eq(mesh, own);
+            if !is_own && !files.iter().any(|(known, _)| Arc::ptr_eq(known, mesh)) {
+                let bytes = handed_over::bytes(mesh);
+                let hash = crate::front::hash(&bytes);
+                files.push((mesh, MeshFile { bytes, hash }));
+            }
+            let file = files.iter().find(|(known, _)| Arc::ptr_eq(known, mesh));
+            let file = file.map(|(_, file)| file.clone());
+            texts.push(self.text(shader).map(|text| Text { mesh: file, ..text }));
+        }
+        self.take(&texts, distance)
+    }
+
     fn device(&mut self) -> Option<&mut dyn stability::Device> {
         Some(self)
     }
@@ -481,10 +514,20 @@ impl Device {
             }
             made.push((locked.name.clone(), file));
         }
+        let mut mesh = None;
+        if let Some(MeshFile { bytes, hash }) = &text.mesh {
+            std::fs::create_dir_all(&self.folder)?;
+            let file = self.folder.join(hash.trim_start_matches("blake3:"));
+            if !file.exists() {
+                std::fs::write(&file, bytes)?;
+            }
+            mesh = Some(file);
+        }
         Ok(Variant {
             text: Some(text.text.clone()),
             auto_lod: text.auto_lod,
             made,
+            mesh,
         })
     }
 

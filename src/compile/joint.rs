@@ -1,7 +1,7 @@
 //! Compiling meshes with shaders: what is asked of a joint search, and the files that it gives.
 
 use super::search::Ready;
-use super::{Files, ModelFile, Request, RunTime, Strategy};
+use super::{Files, ModelFile, Request, Strategy};
 use crate::emit::{LockedFile, LockedMesh, Transition, figure};
 use crate::eval::program::Program;
 use crate::eval::refusal;
@@ -10,6 +10,7 @@ use crate::joint::{self, Joint, Settings, Way};
 use crate::report::{JointReport, MeshReport};
 use crate::scene::objects::Object;
 use crate::search::{Found, Kept};
+use crate::time::clock::Clock;
 use crate::{Diagnostic, Result};
 use lodc_mesh::write::{Level, Looks, Sight, glb, table};
 use lodc_passes::Goal;
@@ -63,12 +64,6 @@ impl Ready {
                 "leave `--per-pixel` or `--search` out",
             );
         }
-        if !matches!(request.time, RunTime::Estimated) {
-            return refuse(
-                "run times of meshes are not measured yet",
-                "leave `--time` and `--recordings` out: pairs of meshes and shaders are chosen by estimated times",
-            );
-        }
         if self.scene.goal != Goal::default() {
             return refuse(
                 "levels of meshes and shaders are to save time, and nothing else",
@@ -91,6 +86,7 @@ impl Ready {
         vertex: &Program,
         found: &Found,
         kept: &Kept,
+        clock: Option<&mut dyn Clock>,
     ) -> Result<Option<Joint>> {
         let way = match request.search {
             Strategy::Greedy => return Ok(None),
@@ -111,7 +107,7 @@ impl Ready {
             settings.meshes = 1;
         }
         let asked = (&settings, kept.unstable);
-        let joint = joint::find(&self.stand(vertex), &fragment, found, asked);
+        let joint = joint::find(&self.stand(vertex), &fragment, found, asked, clock);
         joint
             .map(Some)
             .map_err(|refused| refusal(&refused, &self.source))

@@ -239,10 +239,14 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let mut found = search::find(&stand, (request.exact, &kept), clock, progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
     #[cfg(feature = "mesh")]
-    let joint = ready.join(request, &vertex, &found, &kept)?;
+    let joint = {
+        let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
+        ready.join(request, &vertex, &found, &kept, clock)?
+    };
     #[cfg(feature = "mesh")]
     if let Some(joint) = &joint {
         found.levels = joint.levels.iter().map(|of| of.level.clone()).collect();
+        found.timed += joint.timed as usize;
     }
     let says: Vec<String> = found.levels.iter().map(|level| ready.says(level)).collect();
     // What is emitted: with meshes, levels that have new ones alone are not.
@@ -259,7 +263,14 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
     let transitions = ready.transitions(&vertex, emitted, &levels, emission, watch.as_mut())?;
     let mut of_time: Vec<Box<Diagnostic>> = untimed.into_iter().collect();
     if let Some(watch) = &mut watch {
-        watch.branches(&ready.base, &mut found.levels, &levels);
+        // A branch by a uniform is timed on one mesh.
+        #[cfg(feature = "mesh")]
+        let is_joint = joint.is_some();
+        #[cfg(not(feature = "mesh"))]
+        let is_joint = false;
+        if !is_joint {
+            watch.branches(&ready.base, &mut found.levels, &levels);
+        }
         of_time.extend(watch.warnings(&found.levels));
         let recording = watch.recording();
         files.extend(recording.map(|(file, text)| (file, text.into_bytes())));

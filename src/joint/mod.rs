@@ -15,6 +15,7 @@
 //! This work is based on: Liang 2022, sections 5 and 6.
 
 mod candidates;
+mod clock;
 mod confirm;
 mod seen;
 mod table;
@@ -25,6 +26,7 @@ use crate::mesh::{self, Subject};
 use crate::scene::Scene;
 use crate::search::{Found, Level, SampleSet, Samples, examine};
 use crate::stability::Battery;
+use crate::time::clock::Clock;
 use crate::time::model::Model;
 use confirm::{Confirmer, Pieces};
 use lodc_joint::{Monotonicity, NEAR, Pair, Prices, Score, exhaustive, near_fastest, walk};
@@ -117,10 +119,14 @@ pub struct Joint {
     /// The meshes that there were to choose from: the scene's own first, then simpler ones, then a finer one, where shaders compute at
     /// vertices.
     pub meshes: Vec<Arc<Mesh>>,
+    /// How many of them are finer.
+    pub finer: usize,
     /// How many shaders there were.
     pub shaders: usize,
     /// What was looked at.
     pub walked: Vec<Walked>,
+    /// How many pairs were timed at a distance.
+    pub timed: u64,
     /// What the choice comes to, beside others.
     pub scores: Scores,
     /// What transitions and switches cost.
@@ -128,7 +134,8 @@ pub struct Joint {
 }
 
 /// Looks for pairs of a mesh and a shader. `fragment` is the original's fragment stage; shaders are those that `found` has seen
-/// on the scene's own mesh, and `unstable` says whether they may fail on inputs on which the original holds.
+/// on the scene's own mesh, and `unstable` says whether they may fail on inputs on which the original holds. With a clock, the pairs that the
+/// model puts within reach of the fastest are timed, and chosen by that; without, by their estimated times.
 ///
 /// # Errors
 /// When the evaluator refuses the original, at the expression.
@@ -137,6 +144,7 @@ pub fn find(
     fragment: &Program,
     found: &Found,
     (settings, unstable): (&Settings, bool),
+    mut clock: Option<&mut dyn Clock>,
 ) -> Result<Joint, Refused> {
     let scene = stand.scene;
     let subject = Subject {
@@ -163,7 +171,14 @@ pub fn find(
             scene,
         })
         .collect();
-    let candidates = Candidates::new(&stands, &shaders, Model::estimated())?;
+    let model = clock
+        .as_ref()
+        .map_or_else(Model::estimated, |clock| clock.model());
+    let candidates = Candidates::new(&stands, &shaders, model)?;
+    let (reach, pairs) = match clock {
+        Some(_) => (clock::REACH, 2 * settings.pairs),
+        None => (NEAR, settings.pairs),
+    };
     // The original as it stands is drawn near by alone: what draws the same for less takes its place.
     let original = Pair { mesh: 0, shader: 0 };
     let first = usize::from(!found.exact.recipe.0.is_empty());
@@ -207,7 +222,7 @@ pub fn find(
                 .filter(|pair| at.seen(**pair).strain(bound) <= 1.0),
         );
         let times: Vec<f64> = within.iter().map(|pair| at.seen(*pair).time).collect();
-        let fastest = near_fastest(&times, NEAR).into_iter().take(settings.pairs);
+        let fastest = near_fastest(&times, reach).into_iter().take(pairs);
         let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
         chosen.extend(&fastest);
         // What a simpler mesh or a simpler shader would gain alone is there to choose too, however little that is here: one that
@@ -231,7 +246,10 @@ pub fn find(
     let mut confirmer = Confirmer::new(&candidates, Some(&battery).filter(|_| !unstable));
     // Once with all of them; and with what meshes have alone, and shaders: which plan is refused first decides what is asked next, so
     // that the plan of all might come to more than theirs.
-    let whole = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
+    let mut whole = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
+    let timed = clock.as_deref_mut().map_or(0, |clock| {
+        clock::measure(&mut whole, clock, &meshes, &shaders)
+    });
     let of_meshes = whole.clone().without(|pair| pair.shader != first);
     let of_shaders = whole.clone().without(|pair| pair.mesh != 0);
     let mut best: Option<(Scores, Vec<(Run, Pieces)>)> = None;
@@ -290,7 +308,10 @@ pub fn find(
     let mut of_runs: Vec<Level> = of_runs.collect();
     examine(stand, (&battery, &found.exact), &mut of_runs)?;
     let mut before = original;
-    for (run, level) in runs.into_iter().zip(of_runs) {
+    for (run, mut level) in runs.into_iter().zip(of_runs) {
+        if let Some(clock) = clock.as_deref_mut() {
+            clock::level(&mut level, clock, &meshes[run.pair.mesh]);
+        }
         let last = &levels[levels.len() - 1].level;
         if level.autolod <= last.autolod && levels.len() > 1 {
             // Two thresholds that are the same in hundredths.
@@ -306,8 +327,10 @@ pub fn find(
     Ok(Joint {
         levels,
         shaders: shaders.len(),
+        finer: meshes.len() - simpler,
         meshes,
         walked,
+        timed,
         scores,
         prices: settings.prices,
     })

@@ -41,10 +41,10 @@ pub(super) struct Run {
 #[derive(Clone)]
 pub(super) struct Table<'a> {
     scene: &'a Scene,
-    distances: Vec<f64>,
+    pub(super) distances: Vec<f64>,
     /// Bins from each distance to the next.
     per: usize,
-    pairs: Vec<Pair>,
+    pub(super) pairs: Vec<Pair>,
     /// For each distance, each pair.
     seen: Vec<Vec<Seen>>,
     /// For each distance, what is seen of each pair in place of each other one.
@@ -101,6 +101,15 @@ impl<'a> Table<'a> {
             }
         }
         self
+    }
+
+    /// Puts what a clock says in the place of what the model does: for each distance and each pair its time as a share of the original's.
+    pub(super) fn timed(&mut self, times: &[Vec<f64>]) {
+        for (seen, times) in self.seen.iter_mut().zip(times) {
+            for (seen, time) in seen.iter_mut().zip(times) {
+                seen.time = *time;
+            }
+        }
     }
 
     fn bins(&self) -> usize {

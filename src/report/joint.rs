@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct JointReport {
     /// How pairs were looked for: `separate` or `exhaustive`.
     pub search: &'static str,
-    /// How many meshes there were to choose from, with the original and a finer one.
+    /// How many meshes there were to choose from, with the original.
     pub meshes: usize,
     /// How many shaders, with the original.
     pub shaders: usize,
@@ -83,7 +83,7 @@ impl JointReport {
         });
         Self {
             search,
-            meshes: joint.meshes.len(),
+            meshes: joint.meshes.len() - joint.finer,
             shaders: joint.shaders,
             walked: walked.collect(),
             prices: PricesReport {

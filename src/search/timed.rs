@@ -298,9 +298,11 @@ mod tests {
     use crate::front::Source;
     use crate::scene::Scene;
     use crate::search::{Found, Kept, Scope, find};
+    use lodc_mesh::Mesh;
     use lodc_passes::Stage;
     use lodc_passes::cost::of_function;
     use std::path::Path;
+    use std::sync::Arc;
 
     /// A clock that says what a function of the static work makes of it, relative to the original's.
     struct Said<'a> {
@@ -328,6 +330,11 @@ mod tests {
                 .map(|shader| (self.says)(work(shader) / whole));
             said.map(|ratio| ratio.map(timing).into_iter().collect())
                 .collect()
+        }
+
+        fn time_on(&mut self, pairs: &[(&Arc<Mesh>, &Shader)], distance: f64) -> Vec<Vec<Timing>> {
+            let shaders: Vec<&Shader> = pairs.iter().map(|(_, shader)| *shader).collect();
+            self.time(&shaders, distance)
         }
     }
 

@@ -2,12 +2,15 @@
 //!
 //! ```text
 //! [Shader] x distance --Clock--> [one Timing for each adapter]
+//! [Mesh x Shader] x distance --Clock--> the same
 //! ```
 
 use super::Timing;
 use super::model::Model;
 use crate::stability::Device;
+use lodc_mesh::Mesh;
 use lodc_passes::Shader;
+use std::sync::Arc;
 
 /// Times variants of one shader in one scene. A search asks it, and knows nothing of devices.
 pub trait Clock {
@@ -22,6 +25,9 @@ pub trait Clock {
     /// Times variants against the original at a distance from the eye to the object's centre, in world units. For each one
     /// timing for each adapter; none at all where it could not be timed on one of them.
     fn time(&mut self, variants: &[&Shader], distance: f64) -> Vec<Vec<Timing>>;
+
+    /// The same of shaders on meshes of their own, against the original on the scene's own mesh.
+    fn time_on(&mut self, pairs: &[(&Arc<Mesh>, &Shader)], distance: f64) -> Vec<Vec<Timing>>;
 
     /// The device that it times on, to be asked about single inputs; nothing where there is none.
     fn device(&mut self) -> Option<&mut dyn Device> {

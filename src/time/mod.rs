@@ -11,6 +11,7 @@
 //! The GPU's part, which takes the times, is `gpu::time`. Nothing here knows a device.
 
 pub mod clock;
+pub(crate) mod handed_over;
 pub mod model;
 pub mod statistics;
 pub mod store;

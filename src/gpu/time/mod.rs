@@ -22,6 +22,7 @@ use crate::eval::draw::{DrawState, state_of};
 use crate::eval::machine::Bindings;
 use crate::eval::parameters::ParameterStage;
 use crate::eval::raster::Frame;
+use crate::scene::mesh::Mesh;
 use crate::scene::{Output, Scene};
 use crate::time::statistics::{Estimate, Round, drifts, floor, median, ratio, throttles};
 use crate::time::{Effort, PipelineStatistics, Timing, TimingWarning};
@@ -63,9 +64,17 @@ pub struct Timed {
     more: Bindings,
     /// What fills its block of parameters.
     filled: Vec<Arc<ParameterStage>>,
+    /// The mesh that it is drawn on, where that is not the scene's own.
+    mesh: Option<Arc<Mesh>>,
 }
 
 impl Timed {
+    /// The same on another mesh.
+    #[must_use]
+    pub(super) fn on(self, mesh: Option<Arc<Mesh>>) -> Self {
+        Self { mesh, ..self }
+    }
+
     /// The same with textures that the scene does not have, and with what fills blocks of parameters.
     #[must_use]
     pub(super) fn with(self, more: Bindings, filled: Vec<Arc<ParameterStage>>) -> Self {
@@ -146,6 +155,7 @@ impl Renderer<'_> {
                 compiled: start.elapsed(),
                 more: Bindings::new(),
                 filled: Vec::new(),
+                mesh: None,
             })
         })
     }
@@ -216,6 +226,9 @@ impl Renderer<'_> {
                 let mut frame = Cow::Borrowed(frame);
                 if !timed.more.is_empty() {
                     frame.to_mut().bindings.extend(timed.more.clone());
+                }
+                if let Some(mesh) = &timed.mesh {
+                    frame.to_mut().mesh = Arc::clone(mesh);
                 }
                 let draws = frame.mesh.draws().len();
                 for stage in &timed.filled {

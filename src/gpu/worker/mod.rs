@@ -93,6 +93,8 @@ pub struct Variant {
     /// The textures that were made for the text: the names of their variables, and their files. They are bound where it is
     /// timed or fed; a picture is drawn without them.
     pub made: Vec<(String, PathBuf)>,
+    /// The file of the mesh that it is timed on, where that is not the scene's own.
+    pub mesh: Option<PathBuf>,
 }
 
 /// Which picture.
@@ -245,6 +247,7 @@ mod tests {
                     text: Some("fn é() {}".to_owned()),
                     auto_lod: Some(0.1),
                     made: vec![("loctx_0".to_owned(), "a.png".into())],
+                    mesh: Some("mesh".into()),
                 },
                 wanted: Wanted {
                     distance: 2.5,

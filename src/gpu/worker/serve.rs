@@ -11,9 +11,10 @@ use crate::gpu::time::{Place, Timed};
 use crate::gpu::{Gpu, Pipeline, Renderer, Stages};
 use crate::scene::{Scene, filled};
 use crate::stability::Asked;
-use crate::time::Effort;
+use crate::time::{Effort, handed_over};
 use crate::{Diagnostic, Result};
 use std::io::{Read, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -186,7 +187,11 @@ impl<'g> Loaded<'g> {
 
     /// A variant compiled for being timed, with the textures that were made for it and what fills its parameters.
     fn timed(&self, variant: &Variant) -> Result<Timed> {
-        let timed = self.compiled(variant, Renderer::timed)?;
+        let mut timed = self.compiled(variant, Renderer::timed)?;
+        if let Some(file) = &variant.mesh {
+            let bytes = read(file, "mesh")?;
+            timed = timed.on(Some(Arc::new(handed_over::mesh(&bytes)?)));
+        }
         let Some(text) = &variant.text else {
             return Ok(timed);
         };
@@ -204,6 +209,13 @@ fn no_vertices() -> Box<Diagnostic> {
         .with_note("give it the vertex entry point of the shader")
 }
 
+/// What was handed over in a file.
+fn read(file: &Path, what: &str) -> Result<Vec<u8>> {
+    std::fs::read(file).map_err(|error| {
+        Diagnostic::error(format!("cannot read the {what} `{}`", file.display())).with_reason(error)
+    })
+}
+
 /// The textures that were made for a variant, where its text binds them.
 fn made(source: &Source, variant: &Variant) -> Result<Bindings> {
     let mut more = Bindings::new();
@@ -212,9 +224,7 @@ fn made(source: &Source, variant: &Variant) -> Result<Bindings> {
         let declared = declared.find(|(_, declared)| declared.name.as_ref() == Some(name));
         let binding = declared.and_then(|(_, declared)| declared.binding);
         let shown = file.display().to_string();
-        let bytes = std::fs::read(file).map_err(|error| {
-            Diagnostic::error(format!("cannot read the texture `{shown}`")).with_reason(error)
-        })?;
+        let bytes = read(file, "texture")?;
         if let Some(at) = binding {
             let texture = Arc::new(generated::read(&shown, &bytes)?);
             more.insert((at.group, at.binding), Resource::Texture(texture));
