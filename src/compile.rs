@@ -28,7 +28,7 @@ mod seen_mesh;
 mod snapshot;
 #[cfg(feature = "search")]
 mod stability;
-mod textures;
+pub(crate) mod textures;
 #[cfg(feature = "search")]
 mod transition;
 
@@ -215,7 +215,7 @@ impl Request {
     }
 
     /// The same without its folder.
-    fn stem(&self) -> String {
+    pub(crate) fn stem(&self) -> String {
         let base = self.base();
         let name = base.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
@@ -235,7 +235,7 @@ impl Request {
     }
 
     /// What is written: what was asked for, else what `otherwise` says.
-    fn emission(&self, otherwise: Output) -> Output {
+    pub(crate) fn emission(&self, otherwise: Output) -> Output {
         let transition = self.transition.unwrap_or(otherwise.transition);
         // A band wants a value that changes from draw to draw.
         let form = match transition {
@@ -283,7 +283,7 @@ impl Request {
     }
 
     /// Refuses to write over what was read.
-    fn spare(&self, files: &Files, inputs: &[PathBuf]) -> Result<()> {
+    pub(crate) fn spare(&self, files: &Files, inputs: &[PathBuf]) -> Result<()> {
         for (file, _) in files {
             let Ok(place) = file.canonicalize() else {
                 continue;
@@ -354,52 +354,108 @@ struct Relocked {
     warnings: Vec<Box<Diagnostic>>,
 }
 
+/// A shader, and what became of its lock.
+pub(crate) struct Replayed {
+    /// The lock, when there is one.
+    pub(crate) lock: Option<Lock>,
+    pub(crate) source: Source,
+    /// Its normal form.
+    pub(crate) base: Shader,
+    /// The levels made again, with what is worth saying; or why they cannot be: the lock is missing or stale.
+    #[allow(clippy::vec_box, reason = "as diagnostics are handed around")]
+    pub(crate) levels: Result<(Vec<EmitLevel>, Vec<Box<Diagnostic>>)>,
+}
+
 /// Reads the lock of a request and replays it.
 fn read_lock(request: &Request) -> Result<Relocked> {
+    // Without a lock the shader does not matter.
+    if !request.lock().exists() {
+        return Err(Lock::missing(&request.lock()));
+    }
+    let Replayed {
+        lock,
+        source,
+        base,
+        levels,
+    } = replay(request)?;
+    let (levels, warnings) = levels?;
+    let lock = lock.ok_or_else(|| Lock::missing(&request.lock()))?;
+    Ok(Relocked {
+        lock,
+        source,
+        base,
+        levels,
+        warnings,
+    })
+}
+
+/// Reads a shader as its lock says, and replays that.
+///
+/// # Errors
+/// When the shader or the lock cannot be read. That the lock is missing or stale is none.
+pub(crate) fn replay(request: &Request) -> Result<Replayed> {
     let path = request.lock();
-    let (lock, text) = Lock::read(&path)?;
+    let read = match path.exists() {
+        true => Some(Lock::read(&path)?),
+        false => None,
+    };
     let folder = path.parent().unwrap_or(Path::new(""));
-    let stages = Stages {
-        vertex: request
-            .stages
-            .vertex
-            .clone()
-            .or_else(|| lock.source.vertex.clone()),
-        fragment: request
-            .stages
-            .fragment
-            .clone()
-            .or_else(|| Some(lock.source.fragment.clone())),
-        vertex_file: request.stages.vertex_file.clone().or_else(|| {
-            let file = lock.source.vertex_file.as_ref()?;
-            Some(folder.join(file))
-        }),
-    };
-    let modules = match request.modules == Modules::default() {
-        true => Modules {
-            folders: lock
-                .modules
-                .folders
-                .iter()
-                .map(|f| folder.join(f))
-                .collect(),
-            definitions: lock.modules.definitions.clone(),
-        },
-        false => request.modules.clone(),
-    };
-    let source = Source::read_with(&request.shader, &stages, &modules)?;
+    let locked = read.as_ref().map(|(lock, _)| lock);
+    let source = read_source(request, locked, folder)?;
     let base = normal_form(&source)?;
-    let levels = lock.replay(&base, &path.display().to_string(), &text)?;
-    let changed = |file: &str, hash: &str| {
-        let Ok(bytes) = std::fs::read(folder.join(file)) else {
-            return true;
-        };
-        // A byte order mark is no part of a text that was read.
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-        front::hash(text) != hash
+    let levels = match &read {
+        None => Err(Lock::missing(&path)),
+        Some((lock, text)) => {
+            let levels = lock.replay(&base, &path.display().to_string(), text);
+            levels.and_then(|levels| Ok((levels, since(lock, folder)?)))
+        }
     };
+    Ok(Replayed {
+        lock: read.map(|(lock, _)| lock),
+        source,
+        base,
+        levels,
+    })
+}
+
+/// Reads a shader as it was asked for, else as its lock says. `folder` is the lock's.
+fn read_source(request: &Request, lock: Option<&Lock>, folder: &Path) -> Result<Source> {
+    let of_lock = lock.map(|lock| (&lock.source, &lock.modules));
+    let mut stages = request.stages.clone();
+    if let Some((source, _)) = of_lock {
+        stages.vertex = stages.vertex.or_else(|| source.vertex.clone());
+        stages.fragment = stages.fragment.or_else(|| Some(source.fragment.clone()));
+        let vertex_file = source.vertex_file.as_ref().map(|file| folder.join(file));
+        stages.vertex_file = stages.vertex_file.or(vertex_file);
+    }
+    let modules = match of_lock {
+        Some((_, modules)) if request.modules == Modules::default() => Modules {
+            folders: modules.folders.iter().map(|f| folder.join(f)).collect(),
+            definitions: modules.definitions.clone(),
+        },
+        _ => request.modules.clone(),
+    };
+    Source::read_with(&request.shader, &stages, &modules)
+}
+
+/// Whether a file that a lock names is gone, or no longer what it was.
+fn has_changed(folder: &Path, file: &str, hash: &str) -> bool {
+    let Ok(bytes) = std::fs::read(folder.join(file)) else {
+        return true;
+    };
+    // A byte order mark is no part of a text that was read.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    front::hash(text) != hash
+}
+
+/// What has changed since a lock was made and does not matter for what is written.
+///
+/// # Errors
+/// When a texture has changed that does.
+#[allow(clippy::vec_box, reason = "as diagnostics are handed around")]
+fn since(lock: &Lock, folder: &Path) -> Result<Vec<Box<Diagnostic>>> {
     for texture in &lock.textures {
-        if changed(&texture.file, &texture.hash) {
+        if has_changed(folder, &texture.file, &texture.hash) {
             return Err(Diagnostic::error(format!(
                 "the lock is stale: the texture `{}` has changed since its mean was taken or it went into another one, or is gone",
                 texture.file
@@ -414,7 +470,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
         ("file of meshes", &lock.meshes),
     ] {
         if let Some(file) = file
-            && changed(&file.file, &file.hash)
+            && has_changed(folder, &file.file, &file.hash)
         {
             warnings.push(
                 Diagnostic::warning(format!(
@@ -427,13 +483,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
             );
         }
     }
-    Ok(Relocked {
-        lock,
-        source,
-        base,
-        levels,
-        warnings,
-    })
+    Ok(warnings)
 }
 
 /// The way from a folder to a file, with forward slashes; the file's own path when there is none.

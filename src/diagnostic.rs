@@ -16,7 +16,7 @@ pub enum Severity {
 }
 
 /// One message. Messages and notes are lower case, without a full stop.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Diagnostic {
     /// Error or warning.
     pub severity: Severity,
@@ -168,6 +168,14 @@ impl fmt::Display for Diagnostic {
     }
 }
 
+/// As it is shown, but for the word in front: a `main` that returns it prints `Error: ` and this.
+impl fmt::Debug for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shown = self.render(false);
+        f.write_str(shown.strip_prefix("error: ").unwrap_or(&shown))
+    }
+}
+
 impl std::error::Error for Diagnostic {}
 
 #[cfg(test)]
@@ -186,6 +194,16 @@ mod tests {
         assert!(text.contains("a.wgsl:1:9"), "{text}");
         assert!(text.contains("= note: there is none"), "{text}");
         assert!(text.contains("= help: declare it"), "{text}");
+    }
+
+    #[test]
+    fn a_main_that_fails_says_it_in_full() {
+        let error = Diagnostic::error("no such thing").with_note("declare it");
+        let shown = format!("Error: {error:?}");
+        assert_eq!(
+            shown.trim_end(),
+            "Error: no such thing\n = help: declare it"
+        );
     }
 
     #[test]

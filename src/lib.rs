@@ -3,11 +3,13 @@
 //! It reads a material shader and writes a drop-in replacement that contains cheaper versions of it,
 //! chosen by one `autoLOD` value, each with its measured error.
 
+pub mod build;
 pub mod compile;
 pub mod diagnostic;
 pub mod emit;
 pub mod front;
 
+pub use build::{Built, Compiler, Stale};
 pub use diagnostic::{Diagnostic, Result};
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ pub use generated::Generated;
 pub use goal::{Goal, Used};
 pub use normalize::{NormalizeError, normalize, normalize_stages};
 pub use rate::{Rate, Rates};
-pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError};
+pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError, Surviving};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
 /// Every pass, in the order in which candidates are listed.

@@ -67,6 +67,30 @@ impl Candidate {
         }
     }
 
+    /// The same candidate with its values named as in another version of their shader's source, if they are still computed
+    /// as they were. What that version does not have may come from an earlier step.
+    fn still_known_to(&self, base: &Shader) -> Result<Self, Declined> {
+        let still = |id: &ValueId| match base.known_as(id) {
+            None => Ok(id.clone()),
+            Some(now) if id.hash() == 0 || now.hash() == id.hash() => Ok(now.clone()),
+            // Another value may have taken its name.
+            Some(_) => base
+                .only_with_hash(id)
+                .cloned()
+                .ok_or_else(|| Declined(format!("`{}` is computed otherwise now", id.path()))),
+        };
+        let word = |word: &str| match word.contains('#') {
+            true => still(&word.into()).map(|id| id.to_string()),
+            false => Ok(word.to_owned()),
+        };
+        let words: Result<Vec<String>, Declined> = self.choice.split(' ').map(word).collect();
+        Ok(Self {
+            site: still(&self.site)?,
+            choice: words?.join(" "),
+            ..self.clone()
+        })
+    }
+
     /// The numbers that it bakes, when they are `count` finite ones.
     ///
     /// # Errors
@@ -213,6 +237,47 @@ impl Recipe {
             })?;
         }
         Ok(shader)
+    }
+}
+
+/// What is left of a recipe on another version of its source.
+#[derive(Clone, Debug)]
+pub struct Surviving {
+    /// The steps that still apply, one after the other, with their values as they are named now.
+    pub recipe: Recipe,
+    /// The shader that they make.
+    pub shader: Shader,
+    /// The others, with their places in the recipe as it was.
+    pub lost: Vec<ReplayError>,
+}
+
+impl Recipe {
+    /// Applies every candidate that still applies to another version of the source that the recipe was made for: its values
+    /// are there, computed as they were, and its pass takes it. `start` is what another recipe has made of that version, `base`.
+    pub fn surviving(&self, start: &Shader, base: &Shader) -> Surviving {
+        let mut shader = start.clone();
+        let (mut recipe, mut lost) = (Self::default(), Vec::new());
+        for (step, candidate) in self.0.iter().enumerate() {
+            let applied = candidate
+                .still_known_to(base)
+                .and_then(|known| Ok((apply(&shader, &known)?, known)));
+            match applied {
+                Ok((next, known)) => {
+                    shader = next;
+                    recipe.0.push(known);
+                }
+                Err(declined) => lost.push(ReplayError {
+                    step,
+                    candidate: candidate.clone(),
+                    declined,
+                }),
+            }
+        }
+        Surviving {
+            recipe,
+            shader,
+            lost,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The files of the textures that are made for levels.
 
 use super::{Files, Relocked, Request};
-use crate::emit::{GeneratedTexture, LockedGenerated};
+use crate::emit::{GeneratedTexture, Lock, LockedGenerated};
 use crate::{Diagnostic, Result, front};
 use std::path::PathBuf;
 
@@ -11,17 +11,22 @@ use crate::{eval::generated::GeneratedTextures, scene::Scene};
 use std::path::Path;
 
 /// A texture that was made for levels, as a file.
-pub(super) struct Made {
+pub(crate) struct Made {
     /// What the lock says of it.
-    pub(super) locked: LockedGenerated,
+    pub(crate) locked: LockedGenerated,
     /// The file's contents.
-    pub(super) bytes: Vec<u8>,
+    pub(crate) bytes: Vec<u8>,
 }
 
 impl Request {
     /// The folder of the textures that are made for levels.
     fn textures(&self) -> PathBuf {
         self.beside("lod")
+    }
+
+    /// The path of one of them by its file's name.
+    pub(crate) fn generated(&self, file: &str) -> PathBuf {
+        self.textures().join(file)
     }
 
     /// The files of made textures, in their folder.
@@ -72,23 +77,50 @@ pub(super) fn again(
     if textures.is_empty() {
         return Ok(Vec::new());
     }
-    let made = found(request, read, textures)?;
-    for (at, texture) in textures.iter().enumerate() {
+    #[cfg(feature = "search")]
+    let made = made_again(request, read, textures)?;
+    #[cfg(not(feature = "search"))]
+    let made = on_disk(request, &read.lock, textures)?;
+    expect_as_locked(&read.lock, textures, &made)?;
+    Ok(made)
+}
+
+/// The textures of a lock as they are beside it, which have to be what they were.
+///
+/// # Errors
+/// When one cannot be read or has changed.
+pub(crate) fn committed(
+    request: &Request,
+    lock: &Lock,
+    textures: &[GeneratedTexture],
+) -> Result<Vec<Made>> {
+    let made = on_disk(request, lock, textures)?;
+    expect_as_locked(lock, textures, &made)?;
+    Ok(made)
+}
+
+/// Holds textures against what a lock says of them.
+fn expect_as_locked(lock: &Lock, textures: &[GeneratedTexture], made: &[Made]) -> Result<()> {
+    for (texture, made) in textures.iter().zip(made) {
         let name = &texture.name;
-        let mut locked = read.lock.generated.iter();
+        let mut locked = lock.generated.iter();
         let locked = locked.find(|locked| locked.name == *name);
-        if locked.is_none_or(|locked| locked.hash != made[at].locked.hash) {
+        if locked.is_none_or(|locked| locked.hash != made.locked.hash) {
             return Err(Diagnostic::error(format!(
                 "the lock is stale: the texture `{name}` that was made for levels is not what it was"
             ))
             .with_note("renew it: run lodc without `--locked`, and commit what it writes"));
         }
     }
-    Ok(made)
+    Ok(())
 }
 
 #[cfg(feature = "search")]
-fn found(request: &Request, read: &Relocked, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
+fn made_again(
+    request: &Request,
+    read: &Relocked,
+    textures: &[GeneratedTexture],
+) -> Result<Vec<Made>> {
     let lock = request.lock();
     let folder = lock.parent().unwrap_or(Path::new(""));
     let locked = read
@@ -100,10 +132,10 @@ fn found(request: &Request, read: &Relocked, textures: &[GeneratedTexture]) -> R
     make(&Scene::read(&read.source, scene.as_deref())?, textures)
 }
 
-#[cfg(not(feature = "search"))]
-fn found(request: &Request, read: &Relocked, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
+/// The files of textures as they are.
+fn on_disk(request: &Request, lock: &Lock, textures: &[GeneratedTexture]) -> Result<Vec<Made>> {
     let made = textures.iter().map(|texture| {
-        let mut locked = read.lock.generated.iter();
+        let mut locked = lock.generated.iter();
         let locked = locked.find(|locked| locked.name == texture.name);
         let locked = locked.cloned().unwrap_or_default();
         let file = request.textures().join(&locked.file);

@@ -4,9 +4,7 @@ use super::Form;
 use super::body::Body;
 use crate::front::identifiers::Names;
 use crate::{Diagnostic, Result};
-use naga::{AddressSpace, Module, Scalar, StorageAccess, TypeInner};
-#[cfg(feature = "search")]
-use naga::{Handle, Override};
+use naga::{AddressSpace, Handle, Module, Override, Scalar, StorageAccess, TypeInner};
 
 /// Where a level is chosen by.
 pub(crate) struct Control {
@@ -27,7 +25,6 @@ pub(crate) const NAME: &str = "autoLOD";
 
 /// A module's pipeline constant of that name, and the key that it is set by: one with a number is known by its number
 /// alone.
-#[cfg(feature = "search")]
 pub(crate) fn pipeline_constant(module: &Module) -> Option<(Handle<Override>, String)> {
     let mut constants = module.overrides.iter();
     let (handle, constant) = constants.find(|(_, c)| c.name.as_deref() == Some(NAME))?;
@@ -37,7 +34,6 @@ pub(crate) fn pipeline_constant(module: &Module) -> Option<(Handle<Override>, St
 
 /// The buffer of a module that holds a number of that name, by group and binding, and the number's place there, in bytes:
 /// the author's, or what `--form uniform` declares.
-#[cfg(feature = "gpu")]
 pub(crate) fn in_buffer(module: &Module) -> Option<((u32, u32), u32)> {
     let is_number = |ty| module.types[ty].inner == TypeInner::Scalar(Scalar::F32);
     module.global_variables.iter().find_map(|(_, variable)| {

@@ -333,12 +333,16 @@ impl Lock {
     /// When the file cannot be read, and as [`Lock::parse`].
     pub fn read(path: &Path) -> Result<(Self, String)> {
         if !path.exists() {
-            let path = path.display();
-            return Err(Diagnostic::error(format!("there is no lock `{path}`"))
-                .with_note("make it first: run lodc on the shader, without `--locked`"));
+            return Err(Self::missing(path));
         }
         let text = read_text(path, "lock")?;
         Ok((Self::parse(&path.display().to_string(), &text)?, text))
+    }
+
+    /// Says that a lock is not there.
+    pub(crate) fn missing(path: &Path) -> Box<Diagnostic> {
+        Diagnostic::error(format!("there is no lock `{}`", path.display()))
+            .with_note("make it first: run lodc on the shader, without `--locked`")
     }
 
     /// Reads a lock from text; `name` is what messages call the file.
@@ -457,6 +461,7 @@ impl Lock {
                 ),
                 None => stale,
             };
+            let stale = self.surviving(base).said(stale, name, text);
             return Err(stale.with_note(format!(
                 "renew it: run lodc on {} without `--locked`, and commit what it writes",
                 self.source.file
@@ -470,7 +475,7 @@ impl Lock {
                 failed.candidate
             ))
             .with_source(name, text);
-            let error = match place(text, level, failed.step) {
+            let error = match Places::of(text).place(level, failed.step) {
                 Some(span) => error.with_label(span, failed.declined.0),
                 None => error.with_reason(failed.declined.0),
             };
@@ -501,7 +506,83 @@ impl Lock {
     }
 }
 
+/// What is left of a lock's recipes on another version of its source.
+#[derive(Clone, Debug)]
+pub struct Survivors {
+    /// How many steps still apply, of what is exact and of all levels.
+    pub kept: usize,
+    /// How many there are in the lock.
+    pub of: usize,
+    /// Those of each level that do, after what is exact; the lock's order.
+    pub levels: Vec<Recipe>,
+    /// The others: of the level at this place in the lock, or of what is exact.
+    pub lost: Vec<(Option<usize>, ReplayError)>,
+    /// What each level is called: its number.
+    numbers: Vec<usize>,
+}
+
+/// How many steps that no longer apply are told one by one.
+const TOLD: usize = 6;
+
+impl Survivors {
+    /// Adds to a message what still applies, and where what does not is in the lock.
+    fn said(&self, message: Box<Diagnostic>, name: &str, text: &str) -> Box<Diagnostic> {
+        let Self { kept, of, lost, .. } = self;
+        if *of == 0 {
+            return message;
+        }
+        if lost.is_empty() {
+            return message.with_reason(format!("all of its {of} steps still apply"));
+        }
+        let message = message.with_reason(format!(
+            "{kept} of its {of} steps still apply; these do not:"
+        ));
+        let places = Places::of(text);
+        let told = lost
+            .iter()
+            .take(TOLD)
+            .fold(message, |message, (level, lost)| {
+                let of = match level {
+                    Some(level) => format!("level {}", self.numbers[*level]),
+                    None => "what is exact".to_owned(),
+                };
+                let line = places.place(*level, lost.step);
+                let line = line.map_or_else(String::new, |span| {
+                    let before = &text.as_bytes()[..span.start.min(text.len())];
+                    let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+                    format!(":{line}")
+                });
+                message.with_reason(format!("{name}{line}: {of}, {lost}"))
+            });
+        match lost.len().checked_sub(TOLD) {
+            None | Some(0) => told,
+            Some(more) => told.with_reason(format!("and {more} more")),
+        }
+    }
+}
+
 impl Lock {
+    /// What is left of the recipes on another version of the source, whose normal form is `base`.
+    pub fn surviving(&self, base: &Shader) -> Survivors {
+        let exact = self.exact.surviving(base, base);
+        let mut found = Survivors {
+            kept: exact.recipe.0.len(),
+            of: self.exact.0.len(),
+            levels: Vec::new(),
+            lost: exact.lost.into_iter().map(|lost| (None, lost)).collect(),
+            numbers: (0..self.levels.len()).map(|at| self.number(at)).collect(),
+        };
+        for (at, level) in self.levels.iter().enumerate() {
+            let left = level.recipe.surviving(&exact.shader, base);
+            found.kept += left.recipe.0.len();
+            found.of += level.recipe.0.len();
+            found.levels.push(left.recipe);
+            let lost = left.lost.into_iter().map(|lost| (Some(at), lost));
+            found.lost.extend(lost);
+        }
+        found
+    }
+
     /// The number of a level: the first is 0 when it takes the place of the original.
     fn number(&self, at: usize) -> usize {
         let first = self.levels.first();
@@ -566,14 +647,23 @@ fn string(text: &str) -> String {
     toml::Value::String(text.replace(['\n', '\r'], " ")).to_string()
 }
 
-/// Where a step of a level's recipe is, or one of what is exact.
-fn place(text: &str, level: Option<usize>, step: usize) -> Option<Range<usize>> {
-    let raw: RawLock = toml::from_str(text).ok()?;
-    let recipe = match level {
-        Some(level) => &raw.level.get(level)?.recipe,
-        None => &raw.exact,
-    };
-    Some(recipe.get(step)?.span())
+/// Where the steps of a lock are in its text.
+struct Places(Option<RawLock>);
+
+impl Places {
+    fn of(text: &str) -> Self {
+        Self(toml::from_str(text).ok())
+    }
+
+    /// Where a step of a level's recipe is, or one of what is exact.
+    fn place(&self, level: Option<usize>, step: usize) -> Option<Range<usize>> {
+        let raw = self.0.as_ref()?;
+        let recipe = match level {
+            Some(level) => &raw.level.get(level)?.recipe,
+            None => &raw.exact,
+        };
+        Some(recipe.get(step)?.span())
+    }
 }
 
 fn read<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T> {
@@ -998,7 +1088,7 @@ mod tests {
     #[test]
     fn places_of_steps_are_found() {
         let text = lock().to_toml();
-        let span = place(&text, Some(0), 1).expect("it is there");
+        let span = (Places::of(&text).place(Some(0), 1)).expect("it is there");
         assert!(text[span].contains("texture-removal"));
     }
 }

@@ -21,11 +21,11 @@ mod lock;
 mod parameters;
 mod per_pixel;
 mod print;
-mod rust;
+pub(crate) mod rust;
 mod says;
 mod source;
 mod splice;
-mod targets;
+pub(crate) mod targets;
 mod tidy;
 pub(crate) mod tokens;
 mod transition;
@@ -41,7 +41,7 @@ pub(crate) use generated::settled;
 pub use generated::{GeneratedTexture, generated_textures};
 pub use lock::{
     FORMAT, Lock, LockedFile, LockedGenerated, LockedLevel, LockedMesh, LockedModules,
-    LockedSource, LockedTexture, figure,
+    LockedSource, LockedTexture, Survivors, figure,
 };
 pub use says::says;
 #[cfg(feature = "search")]
@@ -228,32 +228,62 @@ pub fn emit_as(
     output: Output,
     stem: &str,
 ) -> Result<Files> {
+    Ok(emitted(source, base, levels, output, stem)?.files)
+}
+
+/// What was emitted, and what a host binds to it.
+pub(crate) struct Emitted {
+    pub(crate) files: Files,
+    /// The texts as they are read back: one, or in the form of files one a level, the nearest first.
+    pub(crate) texts: Vec<Source>,
+    /// The levels with their generated textures as they are in the texts.
+    pub(crate) levels: Vec<EmitLevel>,
+}
+
+/// As [`emit_as`], with what it was made of.
+///
+/// # Errors
+/// As [`emit_as`].
+pub(crate) fn emitted(
+    source: &Source,
+    base: &Shader,
+    levels: &[EmitLevel],
+    output: Output,
+    stem: &str,
+) -> Result<Emitted> {
     check_thresholds(levels)?;
     check_band(output)?;
     let source = &*composed::composed(source)?;
-    let levels = &*Settled::new(source, levels, output.form).levels;
-    let written = |stem: String, text: String| {
+    let levels = Settled::new(source, levels, output.form).levels;
+    let mut files = Files::new();
+    let mut texts = Vec::new();
+    let mut write = |stem: String, text: String| -> Result<()> {
         let read = read_back(&text, source)?;
-        written(source, &read, &text, output.target, &stem)
+        files.extend(written(source, &read, &text, output.target, &stem)?);
+        texts.push(read);
+        Ok(())
     };
     match output.form {
         Form::Override | Form::Uniform => {
-            let spliced = splice::splice(source, base, levels, output, stem)?;
+            let spliced = splice::splice(source, base, &levels, output, stem)?;
             if output.target != Target::Wgsl && spliced.by_override {
                 return Err(no_override(output.target));
             }
-            written(format!("{stem}.lod"), spliced.text)
+            write(format!("{stem}.lod"), spliced.text)?;
         }
         Form::Files => {
-            let mut files = Vec::new();
-            for at in usize::from(at_zero(levels).0.is_some())..=levels.len() {
-                let text = level_alone(source, levels, at, stem)?;
-                let number = number(levels, at);
-                files.extend(written(format!("{stem}.lod{number}"), text)?);
+            for at in usize::from(at_zero(&levels).0.is_some())..=levels.len() {
+                let text = level_alone(source, &levels, at, stem)?;
+                let number = number(&levels, at);
+                write(format!("{stem}.lod{number}"), text)?;
             }
-            Ok(files)
         }
     }
+    Ok(Emitted {
+        files,
+        texts,
+        levels,
+    })
 }
 
 /// The shader of all levels in WGSL, as it is read back.

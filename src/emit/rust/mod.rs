@@ -78,6 +78,12 @@ pub(super) fn written(
 
 /// The text of an entry point that fills a storage buffer.
 fn stage(module: &Module, point: &EntryPoint) -> Written<String> {
+    staged(Types::new(module)?, point)
+}
+
+/// The same, with structures that have been asked for already.
+fn staged<'a>(types: Types<'a>, point: &'a EntryPoint) -> Written<String> {
+    let module = types.module;
     let called = called_by(module, &point.function);
     let mut read = variables_of(&point.function);
     for function in &called {
@@ -85,7 +91,6 @@ fn stage(module: &Module, point: &EntryPoint) -> Written<String> {
     }
     let stored = stored(module, &read)?;
     let ty = module.global_variables[stored].ty;
-    let types = Types::new(module)?;
     let mut names = Names::default();
     names.reserve([MODULE, "libm"]);
     let mut shared = Shared {
@@ -131,6 +136,72 @@ fn stage(module: &Module, point: &EntryPoint) -> Written<String> {
     out.push_str(&functions);
     out.push_str(&shared.prelude.written());
     Ok(out)
+}
+
+/// The buffers of an emitted text as Rust.
+pub(crate) struct Buffers {
+    /// Structures with their layouts, and the parameter stage where there is one.
+    pub(crate) text: String,
+    /// The type of each uniform and storage buffer that can be written as one.
+    pub(crate) types: BTreeMap<Handle<GlobalVariable>, String>,
+    /// The names of the structures that these are made of.
+    pub(crate) structures: Vec<String>,
+}
+
+/// The structures of all buffers that an emitted text declares, and its parameter stage, which is the entry point of this
+/// name. A buffer that Rust has no type for, such as one of atomics, is left out.
+///
+/// # Errors
+/// When the stage has something in it that there is no form for: a flaw, since what can be moved there can be written.
+pub(crate) fn buffers(source: &Source, emitted: &Module, entry: Option<&str>) -> Result<Buffers> {
+    let points = emitted.entry_points.iter();
+    let point = points.clone().find(|point| Some(&*point.name) == entry);
+    all_buffers(emitted, point).map_err(|reason| {
+        let error = Diagnostic::error(format!(
+            "internal error: the buffers of {} cannot be written as Rust: {reason}",
+            file_name(source)
+        ));
+        flaw(error, source)
+    })
+}
+
+fn all_buffers(module: &Module, point: Option<&EntryPoint>) -> Written<Buffers> {
+    let mut types = Types::new(module)?;
+    let mut of_buffers = BTreeMap::new();
+    for (handle, variable) in module.global_variables.iter() {
+        let is_buffer = matches!(
+            variable.space,
+            AddressSpace::Uniform | AddressSpace::Storage { .. }
+        );
+        if is_buffer && let Ok(ty) = buffer(&mut types, variable.ty) {
+            of_buffers.insert(handle, ty);
+        }
+    }
+    let structures = types.declared_names();
+    let mut text = String::new();
+    match point {
+        Some(point) => text = staged(types, point)?,
+        None => {
+            for (_, declared) in types.declared()? {
+                write!(text, "\n{declared}").ok();
+            }
+        }
+    }
+    Ok(Buffers {
+        text,
+        types: of_buffers,
+        structures,
+    })
+}
+
+/// The type of a buffer: of one that ends in an array whose length only it tells, what is before that, or its element.
+fn buffer(types: &mut Types<'_>, ty: Handle<naga::Type>) -> Written<String> {
+    let element = last_element(types, ty);
+    let of_element = element.map(|element| types.element(element)).transpose()?;
+    match of_element {
+        Some(of_element) if types.runtime_element(ty).is_some() => Ok(format!("[{of_element}]")),
+        _ => types.stored(ty),
+    }
 }
 
 /// What the functions may look like that nobody wrote by hand.

@@ -223,6 +223,11 @@ impl<'a> Types<'a> {
         needed.into_iter().map(declare).collect()
     }
 
+    /// The names of those structures.
+    pub(super) fn declared_names(&self) -> Vec<String> {
+        self.needed.iter().map(|ty| self.name(*ty)).collect()
+    }
+
     fn declaration(&mut self, ty: Handle<Type>) -> Written<String> {
         let TypeInner::Struct { members, span } = self.inner(ty) else {
             return Err("a structure that is none".into());
