@@ -194,6 +194,8 @@ pub struct Request {
     pub keep: Vec<String>,
     /// Whether levels may fail on inputs that no picture shows and on which the original holds.
     pub unstable: bool,
+    /// Whether the search begins with what still applies of the recipes of the lock that is there.
+    pub update: bool,
     /// The command that reproduces the result, for the report.
     pub command: String,
 }

@@ -73,11 +73,10 @@ impl Candidate {
         let still = |id: &ValueId| match base.known_as(id) {
             None => Ok(id.clone()),
             Some(now) if id.hash() == 0 || now.hash() == id.hash() => Ok(now.clone()),
-            // Another value may have taken its name.
-            Some(_) => base
-                .only_with_hash(id)
-                .cloned()
-                .ok_or_else(|| Declined(format!("`{}` is computed otherwise now", id.path()))),
+            Some(_) => Err(Declined(format!(
+                "`{}` is computed otherwise now",
+                id.path()
+            ))),
         };
         let word = |word: &str| match word.contains('#') {
             true => still(&word.into()).map(|id| id.to_string()),

@@ -265,17 +265,14 @@ impl Shader {
     pub fn known_as(&self, id: &ValueId) -> Option<&ValueId> {
         let mut with_path = self.values().map(|(_, _, have)| have);
         let by_path = with_path.find(|have| have.path == id.path);
-        by_path.or_else(|| self.only_with_hash(id))
-    }
-
-    /// The only value that is computed as the one with this id was.
-    pub(crate) fn only_with_hash(&self, id: &ValueId) -> Option<&ValueId> {
-        let values = self.values().map(|(_, _, have)| have);
-        let mut with_hash = values.filter(|have| id.hash != 0 && have.hash == id.hash);
-        match (with_hash.next(), with_hash.next()) {
-            (Some(only), None) => Some(only),
-            _ => None,
-        }
+        by_path.or_else(|| {
+            let values = self.values().map(|(_, _, have)| have);
+            let mut with_hash = values.filter(|have| id.hash != 0 && have.hash == id.hash);
+            match (with_hash.next(), with_hash.next()) {
+                (Some(only), None) => Some(only),
+                _ => None,
+            }
+        })
     }
 
     /// The values of all stages, with their ids.

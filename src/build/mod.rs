@@ -103,7 +103,7 @@ impl Compiler {
         }
     }
 
-    /// The lock, where it is not beside the shader.
+    /// The lock, where it is not beside the shader. What is written is called as the lock is.
     #[must_use]
     pub fn lock(mut self, file: impl Into<PathBuf>) -> Self {
         self.request.output = Some(file.into());

@@ -309,6 +309,9 @@ struct CompileArgs {
     /// Writes the shader from the committed lock, without a search
     #[arg(long)]
     locked: bool,
+    /// Searches again, beginning with what still applies of the committed lock
+    #[arg(long, conflicts_with = "locked")]
+    update: bool,
     /// Prints nothing but errors
     #[arg(short, long)]
     quiet: bool,
@@ -786,6 +789,7 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     };
     request.keep = arguments.keep;
     request.unstable = arguments.allow_unstable;
+    request.update = arguments.update;
     request.goal = arguments.goal;
     request.only = arguments.only;
     #[cfg(feature = "mesh")]

@@ -236,7 +236,9 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
         Err(error) => (None, Some(untimed(&error))),
     };
     let clock = watch.as_mut().map(|watch| watch as &mut dyn Clock);
-    let mut found = search::find(&stand, (request.exact, &kept), clock, progress)
+    let old = old_recipes(request)?;
+    let wanted = (request.exact, &kept);
+    let mut found = search::find_from(&stand, wanted, &old, clock, progress)
         .map_err(|refused| refusal(&refused, &ready.source))?;
     #[cfg(feature = "mesh")]
     let joint = {
@@ -343,6 +345,15 @@ pub fn compile(request: &Request, progress: &(dyn Fn(Progress) + Sync)) -> Resul
             .chain(reached)
             .collect(),
     })
+}
+
+/// The recipes of the lock that is to be renewed.
+fn old_recipes(request: &Request) -> Result<Vec<Recipe>> {
+    if !request.update {
+        return Ok(Vec::new());
+    }
+    let (lock, _) = Lock::read(&request.lock())?;
+    Ok(lock.levels.into_iter().map(|level| level.recipe).collect())
 }
 
 /// Says which bindings levels read in the vertex stage that the original reads in the fragment stage alone: a host may

@@ -463,7 +463,7 @@ impl Lock {
             };
             let stale = self.surviving(base).said(stale, name, text);
             return Err(stale.with_note(format!(
-                "renew it: run lodc on {} without `--locked`, and commit what it writes",
+                "renew it: run `lodc {} --update`, which begins with what still applies, and commit what it writes",
                 self.source.file
             )));
         }
@@ -1049,7 +1049,7 @@ mod tests {
             .expect_err("it is stale");
         assert!(error.message.contains("stale"), "{error}");
         assert_eq!(&text[error.labels[0].0.clone()], "0123");
-        assert!(error.notes[0].contains("without `--locked`"), "{error}");
+        assert!(error.notes[0].contains("--update`"), "{error}");
     }
 
     #[test]

@@ -23,7 +23,7 @@ use crate::scene::{Scene, Split};
 use crate::stability::{Battery, Blamed, Judged, Stiff, Ways};
 use crate::time::clock::{Clock, is_faster, worst_ratio};
 use crate::time::{Timing, Verdict};
-use lodc_passes::{Recipe, Shader, Used};
+use lodc_passes::{Candidate, Pass, Recipe, Shader, Used, WITH_PARAMETERS, WITH_TEXTURES};
 
 /// Neighbouring levels of which the later saves less than this share of the earlier's cost are merged.
 const MERGE_BELOW: f64 = 0.04;
@@ -247,6 +247,7 @@ impl<'a> Chain<'a> {
             kept,
             search,
             checks,
+            ..
         } = place;
         self.guard.start_at(search.start().distance());
         let base = Variant::new(search, Recipe::default(), exact.shader.clone())?;
@@ -283,6 +284,18 @@ impl<'a> Chain<'a> {
             if bottom.guard.has_room(&plain.shader) {
                 bottom.judge(&plain)?;
                 starts.push(plain);
+            }
+        }
+        for old in place.old {
+            // What was moved exactly is chosen anew here too.
+            let lossy = parameters::without_exact(old);
+            let left = lossy.surviving(&exact.shader, stand.base);
+            let mut steps = left.recipe.0.iter();
+            let is_allowed = steps.all(|step| place.may_take(step, bottom.asks));
+            if is_allowed && !left.recipe.0.is_empty() && bottom.guard.has_room(&left.shader) {
+                let old = Variant::new(search, left.recipe, left.shader)?;
+                bottom.judge(&old)?;
+                starts.push(old);
             }
         }
         bottom.find(&base, starts.clone())?;
@@ -392,6 +405,20 @@ struct Place<'a, 'p> {
     kept: &'p Kept,
     search: &'p Interval<'a>,
     checks: &'p Checks<'a>,
+    /// Recipes that another search has found, which levels may begin with.
+    old: &'p [Recipe],
+}
+
+impl Place<'_, '_> {
+    /// Whether levels may have a step that another search has found; `asks` says whether they may ask the host for what the scene
+    /// allows.
+    fn may_take(&self, step: &Candidate, asks: bool) -> bool {
+        let host = self.stand.scene.host;
+        let is_of = |passes: &[&dyn Pass]| passes.iter().any(|pass| pass.name() == step.pass);
+        let asks_in_vain = (is_of(WITH_PARAMETERS) && !(asks && host.parameters))
+            || (is_of(WITH_TEXTURES) && !(asks && host.textures));
+        !asks_in_vain && self.kept.admits(&step.pass) && !self.kept.refuses(step)
+    }
 }
 
 /// What was seen in an interval so far.
@@ -416,7 +443,22 @@ struct Tally {
 /// When the evaluator refuses the original, at the expression.
 pub fn find(
     stand: &Stand<'_>,
+    wanted: (Scope, &Kept),
+    clock: Option<&mut dyn Clock>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Found, Refused> {
+    find_from(stand, wanted, &[], clock, progress)
+}
+
+/// As [`find`], with recipes that another search has found, for an older version of the source perhaps: what still applies of
+/// each is judged and gone on from at every distance, beside what is found without it.
+///
+/// # Errors
+/// As [`find`].
+pub fn find_from(
+    stand: &Stand<'_>,
     (scope, kept): (Scope, &Kept),
+    old: &[Recipe],
     clock: Option<&mut dyn Clock>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, Refused> {
@@ -465,6 +507,7 @@ pub fn find(
             kept,
             search: &search,
             checks: &checks,
+            old,
         };
         let mut tally = Tally {
             frontier: match times {
@@ -643,6 +686,7 @@ mod tests {
             kept: &kept,
             search: &search,
             checks: &checks,
+            old: &[],
         };
         let found = [None, plain.as_ref()].map(|plain| {
             let first = Level::original(&stand, &near);

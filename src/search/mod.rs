@@ -43,6 +43,6 @@ pub(crate) use kept::is_within;
 #[cfg(feature = "mesh")]
 pub(crate) use levels::examine;
 pub(crate) use levels::threshold;
-pub use levels::{AtDistance, Found, Level, Progress, Struck, find};
+pub use levels::{AtDistance, Found, Level, Progress, Struck, find, find_from};
 pub use samples::{Measured, OverBlack, SampleSet, Samples};
 pub use trajectory::{Step, trajectory};

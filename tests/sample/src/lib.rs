@@ -11,3 +11,18 @@ pub mod wall {
 pub mod board {
     include!(concat!(env!("OUT_DIR"), "/board.rs"));
 }
+
+/// The board with a file for each level.
+pub mod files {
+    include!(concat!(env!("OUT_DIR"), "/files/board.rs"));
+}
+
+/// The wall as SPIR-V.
+pub mod spirv {
+    include!(concat!(env!("OUT_DIR"), "/spirv/wall.rs"));
+}
+
+/// The wall without its lock: the original alone.
+pub mod original {
+    include!(concat!(env!("OUT_DIR"), "/original/missing.rs"));
+}

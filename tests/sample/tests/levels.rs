@@ -1,6 +1,6 @@
 //! What a program has of its materials: valid shaders, levels by distance, blocks with the layout of the shader.
 
-use sample::{board, wall};
+use sample::{board, files, original, spirv, wall};
 
 fn parsed(text: &str) -> naga::Module {
     let module = naga::front::wgsl::parse_str(text).expect("the shader is WGSL");
@@ -135,4 +135,27 @@ fn lod_parameters(
     paint: &board::buffers::Paint,
 ) -> board::buffers::LodParameters {
     board::buffers::lod_parameters(camera, paint)
+}
+
+#[test]
+fn other_forms_have_the_same_items() {
+    assert_eq!(files::SHADERS.len(), board::LEVELS.len());
+    assert_eq!(files::THRESHOLDS, board::THRESHOLDS);
+    for text in files::SHADERS {
+        parsed(text);
+    }
+    let block = files::buffers_of_level_1::lod_parameters(&files::buffers_of_level_1::Paint {
+        sun: [0.0, 3.0, 4.0],
+        ..Default::default()
+    });
+    assert_eq!(block.to_sun, [0.0, 0.6, 0.8]);
+    let [(name, bytes)] = spirv::SHADERS else {
+        panic!("one file of both stages");
+    };
+    assert_eq!(*name, "wall.lod.spv");
+    assert!(bytes.starts_with(&[3, 2, 0x23, 7]));
+    assert!(spirv::AUTOLOD_BUFFER.is_some());
+    assert!(original::THRESHOLDS.is_empty());
+    assert_eq!((original::LEVELS.len(), original::level(9.0, None)), (1, 0));
+    assert!(parsed(original::SHADER).entry_points.len() == 2);
 }
