@@ -5,10 +5,14 @@
 
 #[cfg(feature = "search")]
 mod calibrate;
+#[cfg(feature = "testing")]
+mod check;
 #[cfg(feature = "search")]
 mod clock;
 #[cfg(feature = "search")]
 mod compare;
+#[cfg(feature = "search")]
+mod difference;
 #[cfg(feature = "search")]
 mod directives;
 #[cfg(feature = "search")]
@@ -35,10 +39,14 @@ mod transition;
 pub use crate::emit::Files;
 #[cfg(feature = "search")]
 pub use calibrate::{CalibrateRequest, Calibrated, Calibrating, calibrate};
+#[cfg(feature = "testing")]
+pub use check::{Check, Difference, check, locks};
 #[cfg(feature = "search")]
 pub use clock::Timings;
 #[cfg(feature = "search")]
 pub use compare::{CompareRequest, Compared, DrawnBy, compare};
+#[cfg(feature = "search")]
+pub use difference::difference;
 #[cfg(feature = "search")]
 pub use init::{InitRequest, init};
 #[cfg(feature = "mesh")]
@@ -68,6 +76,9 @@ use std::path::{Path, PathBuf};
 /// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
 /// The largest shader that was seen has 15,537.
 pub const EXPRESSION_LIMIT: usize = 100_000;
+
+/// How the name of a lock ends.
+const LOCK_ENDING: &str = ".lod.toml";
 
 /// How levels are searched.
 #[cfg(feature = "mesh")]
@@ -153,6 +164,10 @@ pub struct Request {
     pub max_texture_memory: Option<u32>,
     /// The shader to write; by default `<stem>.lod.wgsl` beside the source.
     pub output: Option<PathBuf>,
+    /// The folder that outputs go to under their own names, where no output is named; by default that of the source.
+    pub folder: Option<PathBuf>,
+    /// The lock to replay; by default beside the outputs, and, where there is none, beside the source.
+    pub lock: Option<PathBuf>,
     /// The entry points, where there are several.
     pub stages: Stages,
     /// The modules that may be imported.
@@ -204,7 +219,13 @@ impl Request {
     /// The name that all outputs begin with, `folder/rock` for `folder/rock.lod.wgsl`.
     fn base(&self) -> PathBuf {
         match &self.output {
-            None => self.shader.with_extension(""),
+            None => {
+                let bare = self.shader.with_extension("");
+                match (&self.folder, bare.file_name()) {
+                    (Some(folder), Some(name)) => folder.join(name),
+                    _ => bare,
+                }
+            }
             Some(output) => {
                 let bare = output.with_extension("");
                 if bare.extension().is_some_and(|extension| extension == "lod") {
@@ -231,9 +252,22 @@ impl Request {
         name.into()
     }
 
-    /// The path of the lock.
+    /// The path of the lock that a search writes.
     pub fn lock(&self) -> PathBuf {
         self.beside("lod.toml")
+    }
+
+    /// The path of the lock that is replayed.
+    pub fn committed_lock(&self) -> PathBuf {
+        if let Some(lock) = &self.lock {
+            return lock.clone();
+        }
+        let beside_source = self.shader.with_extension("lod.toml");
+        let lock = self.lock();
+        match !lock.exists() && beside_source.exists() {
+            true => beside_source,
+            false => lock,
+        }
     }
 
     /// What is written: what was asked for, else what `otherwise` says.
@@ -255,6 +289,7 @@ impl Request {
     }
 
     /// Emits under the name that all outputs begin with, and puts the files in their place.
+    #[cfg(feature = "search")]
     fn emitted(
         &self,
         (source, shader): (&Source, &Shader),
@@ -263,6 +298,16 @@ impl Request {
     ) -> Result<Files> {
         let stem = self.stem();
         let files = emit::emit_as(source, shader, levels, emission, &stem)?;
+        Ok(self.placed(files, &stem))
+    }
+
+    /// Emits what a lock makes, which the text names.
+    fn emitted_again(&self, read: &Relocked, emission: Output) -> Result<Files> {
+        let lock = self.committed_lock();
+        let lock = lock.file_name().unwrap_or_default().to_string_lossy();
+        let stem = lock.strip_suffix(LOCK_ENDING);
+        let stem = stem.map_or_else(|| self.stem(), str::to_owned);
+        let files = emit::emit_as(&read.source, &read.base, &read.levels, emission, &stem)?;
         Ok(self.placed(files, &stem))
     }
 
@@ -329,19 +374,45 @@ pub fn normal_form(source: &Source) -> Result<Shader> {
     })
 }
 
-/// Emits from the lock, without a search: what `--locked` and a build script do. Warnings come beside the files: a
-/// scene that has changed since.
+/// What a lock makes.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Remade {
+    /// The files.
+    pub files: Files,
+    /// Every file that decides what they are: the sources with all that they import, the lock, and the textures whose texels went
+    /// into it.
+    pub inputs: Vec<PathBuf>,
+    /// What is worth saying: a scene that has changed since.
+    pub warnings: Vec<Box<Diagnostic>>,
+}
+
+/// Emits from the lock, without a search: what `--locked` and a build script do.
 ///
 /// # Errors
 /// When the source or the lock cannot be read, or the lock is stale.
-pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
+pub fn remade(request: &Request) -> Result<Remade> {
     let read = read_lock(request)?;
     let emission = request.emission(read.lock.output);
-    let mut files = request.emitted((&read.source, &read.base), &read.levels, emission)?;
+    let mut files = request.emitted_again(&read, emission)?;
     let textures = emit::generated_textures(&read.source, &read.levels, emission.form)?;
     files.extend(request.texture_files(textures::again(request, &read, &textures)?));
     request.spare(&files, std::slice::from_ref(&request.shader))?;
-    Ok((files, read.warnings))
+    let inputs = read.inputs(request, !textures.is_empty());
+    Ok(Remade {
+        files,
+        inputs,
+        warnings: read.warnings,
+    })
+}
+
+/// As [`remade`], but for the inputs.
+///
+/// # Errors
+/// As [`remade`].
+pub fn locked(request: &Request) -> Result<(Files, Vec<Box<Diagnostic>>)> {
+    let made = remade(request)?;
+    Ok((made.files, made.warnings))
 }
 
 /// A lock with what it was made from, and its levels made again.
@@ -368,11 +439,32 @@ pub(crate) struct Replayed {
     pub(crate) levels: Result<(Vec<EmitLevel>, Vec<Box<Diagnostic>>)>,
 }
 
+impl Relocked {
+    /// The files that decide what is emitted; with the scene where textures are made again.
+    fn inputs(&self, request: &Request, bakes: bool) -> Vec<PathBuf> {
+        let lock = request.committed_lock();
+        let beside = |file: &String| lock.with_file_name(file);
+        let others = self.source.others.iter();
+        let textures = self.lock.textures.iter();
+        let mut inputs = vec![request.shader.clone()];
+        inputs.extend(others.filter_map(|other| other.path.clone()));
+        inputs.push(lock.clone());
+        inputs.extend(textures.map(|texture| beside(&texture.file)));
+        if bakes {
+            let locked = self.lock.scene.as_ref().map(|scene| beside(&scene.file));
+            inputs.extend(request.scene.clone().or(locked));
+        }
+        let mut known = std::collections::BTreeSet::new();
+        inputs.retain(|input| known.insert(input.clone()));
+        inputs
+    }
+}
+
 /// Reads the lock of a request and replays it.
 fn read_lock(request: &Request) -> Result<Relocked> {
     // Without a lock the shader does not matter.
-    if !request.lock().exists() {
-        return Err(Lock::missing(&request.lock()));
+    if !request.committed_lock().exists() {
+        return Err(Lock::missing(&request.committed_lock()));
     }
     let Replayed {
         lock,
@@ -381,7 +473,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
         levels,
     } = replay(request)?;
     let (levels, warnings) = levels?;
-    let lock = lock.ok_or_else(|| Lock::missing(&request.lock()))?;
+    let lock = lock.ok_or_else(|| Lock::missing(&request.committed_lock()))?;
     Ok(Relocked {
         lock,
         source,
@@ -396,7 +488,7 @@ fn read_lock(request: &Request) -> Result<Relocked> {
 /// # Errors
 /// When the shader or the lock cannot be read. That the lock is missing or stale is none.
 pub(crate) fn replay(request: &Request) -> Result<Replayed> {
-    let path = request.lock();
+    let path = request.committed_lock();
     let read = match path.exists() {
         true => Some(Lock::read(&path)?),
         false => None,
@@ -458,8 +550,8 @@ fn has_changed(folder: &Path, file: &str, hash: &str) -> bool {
 fn since(lock: &Lock, folder: &Path) -> Result<Vec<Box<Diagnostic>>> {
     for texture in &lock.textures {
         if has_changed(folder, &texture.file, &texture.hash) {
-            return Err(Diagnostic::error(format!(
-                "the lock is stale: the texture `{}` has changed since its mean was taken or it went into another one, or is gone",
+            return Err(Diagnostic::stale(format!(
+                "the texture `{}` has changed since its mean was taken or it went into another one, or is gone",
                 texture.file
             ))
             .with_note("renew it: run lodc without `--locked`, and commit what it writes"));

@@ -28,6 +28,8 @@ pub struct Diagnostic {
     pub labels: Vec<(Range<usize>, String)>,
     /// Ways out, printed after `help:`, and more of the reason, which begin with `note: `.
     pub notes: Vec<String>,
+    /// Whether it is about a lock that no longer fits what it was made from: nothing is wrong but that it is old.
+    pub is_stale: bool,
 }
 
 /// What a note that is more of the reason begins with.
@@ -45,6 +47,15 @@ impl Diagnostic {
             source: None,
             labels: Vec::new(),
             notes: Vec::new(),
+            is_stale: false,
+        })
+    }
+
+    /// An error about a lock that no longer fits what it was made from.
+    pub fn stale(message: impl fmt::Display) -> Box<Self> {
+        Box::new(Self {
+            is_stale: true,
+            ..*Self::error(format!("the lock is stale: {message}"))
         })
     }
 

@@ -36,5 +36,7 @@ pub mod scene;
 pub mod search;
 #[cfg(feature = "search")]
 pub mod stability;
+#[cfg(feature = "testing")]
+pub mod testing;
 #[cfg(feature = "search")]
 pub mod time;

@@ -518,6 +518,33 @@ fn what_is_written_of_random_expressions_has_the_errors_that_are_reported() {
     assert!(made >= 3, "{made}");
 }
 
+/// `lodc check` sees texels, and not how a file has them.
+#[cfg(feature = "testing")]
+fn checked_by_texels(request: &Request, textures: &[(PathBuf, Vec<u8>)]) {
+    let differences = || {
+        let check = compile::check(request).unwrap_or_else(|error| panic!("{error}"));
+        check.differences
+    };
+    assert_eq!(differences(), []);
+    let (path, bytes) = textures.first().expect("there is a texture");
+    // What stands behind its end is no part of an image.
+    let longer = [bytes.as_slice(), b"more"].concat();
+    fs::write(path, longer).expect("it can be written");
+    assert_eq!(differences(), []);
+    fs::write(path, &bytes[..bytes.len() / 2]).expect("it can be written");
+    assert_eq!(differences().len(), 1);
+    let grey = lodc::eval::image::encode_png(4, 4, &[[128; 4]; 16]).expect("it is an image");
+    fs::write(path, grey).expect("it can be written");
+    let found = differences();
+    assert!(found[0].what.contains("4 x 4 texels"), "{}", found[0].what);
+    fs::remove_file(path).expect("it is there");
+    let found = differences();
+    assert!(found[0].what.ends_with("is missing\n"), "{}", found[0].what);
+    assert_eq!(found[0].bytes.as_ref(), Some(bytes));
+    fs::write(path, bytes).expect("it can be written");
+    assert_eq!(differences(), []);
+}
+
 /// A folder of the test's own.
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
@@ -632,6 +659,8 @@ fn textures_become_files_that_the_lock_makes_again() {
     }
     #[cfg(feature = "gpu")]
     drawn_by_a_gpu(&request, &compared.comparison);
+    #[cfg(feature = "testing")]
+    checked_by_texels(&request, &before);
     // Another image in the place of a source makes another texture.
     let lock = fs::read_to_string(folder.join("silk.lod.toml")).expect("it was written");
     let other = lock.replace("loctx_0", "loctx_7");

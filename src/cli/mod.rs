@@ -1,8 +1,13 @@
 //! The command line: arguments in, messages and an exit code out. All work is the library's.
 
+mod batch;
 mod calibrate;
+mod check;
 #[cfg(feature = "gpu")]
 mod child;
+mod depfile;
+mod difference;
+mod manual;
 #[cfg(feature = "mesh")]
 mod mesh;
 mod progress;
@@ -16,14 +21,18 @@ use crate::front::{Definition, Modules, Stages};
 use crate::search::Scope;
 use crate::time::Effort;
 use crate::{Diagnostic, Result, report};
+use batch::Said;
 use clap::{Args, Parser, Subcommand};
+use depfile::Rule;
 use lodc_passes::Goal;
 use lodc_passes::autolod::BoundReading;
 use progress::Bar;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Makes cheaper versions of a material shader for the distances at which nobody sees the difference
@@ -45,6 +54,10 @@ struct Cli {
 enum Command {
     /// Lists every place that could be simplified, with its work and its candidates
     Inspect(InputArgs),
+    /// Emits again from locks and compares with what is committed: a diff, and exit code 1 when something differs
+    Check(check::CheckArgs),
+    /// Says which values of a shader another computes otherwise, or not at all: exit code 1 when they differ
+    Diff(difference::DiffArgs),
     /// Measures the error of one shader against another, over a scene
     Compare(CompareArgs),
     /// Writes the scene file, with everything that is inferred and why
@@ -61,6 +74,10 @@ enum Command {
     /// Measures how far the mesh of one model is from that of another
     #[cfg(feature = "mesh")]
     MeshError(mesh::MeshErrorArgs),
+    /// Prints what a shell completes the arguments of lodc by
+    Completions(manual::CompletionsArgs),
+    /// Prints a page of the manual, of lodc or of one of its commands
+    Man(manual::ManArgs),
     /// Draws on the GPU for the process that started it
     #[cfg(feature = "gpu")]
     #[command(hide = true)]
@@ -231,9 +248,16 @@ struct ReadingArgs {
 
 #[derive(Debug, Args)]
 struct CompileArgs {
+    /// The material shader: WGSL, or a GLSL fragment shader; as many as wanted
+    #[arg(required = true, value_name = "SHADER")]
+    files: Vec<PathBuf>,
     #[command(flatten)]
-    input: InputArgs,
-    /// The shader to write; lock and report go beside it [default: beside the source, with .lod.wgsl]
+    reading: ReadingArgs,
+    /// The scene that errors are measured over [default: the shader's name with .toml, if it is there]
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// The shader to write; lock and report go beside it; of several shaders the folder of all [default: beside the source, with
+    /// .lod.wgsl]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// How the host chooses a level [default: the lock's with --locked, else override]
@@ -312,6 +336,14 @@ struct CompileArgs {
     /// Searches again, beginning with what still applies of the committed lock
     #[arg(long, conflicts_with = "locked")]
     update: bool,
+    /// The lock to write it from [default: beside the output, and where there is none, beside the source]
+    #[arg(long, value_name = "FILE", requires = "locked")]
+    lock: Option<PathBuf>,
+    /// Writes which files the outputs depend on, as Make and Ninja read it
+    #[arg(long, value_name = "FILE", requires = "locked")]
+    depfile: Option<PathBuf>,
+    #[command(flatten)]
+    jobs: batch::Jobs,
     /// Prints nothing but errors
     #[arg(short, long)]
     quiet: bool,
@@ -509,34 +541,33 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    let success = |()| ExitCode::SUCCESS;
     let done = match cli.command {
-        Some(Command::Inspect(input)) => inspect(input),
-        Some(Command::Init(arguments)) => init(arguments),
-        Some(Command::Snapshot(arguments)) => snapshot(arguments),
-        Some(Command::Compare(compared)) => match compare(compared, &arguments) {
-            Ok(code) => return code,
-            Err(error) => Err(error),
-        },
-        Some(Command::Stability(arguments)) => match stability(arguments) {
-            Ok(code) => return code,
-            Err(error) => Err(error),
-        },
-        Some(Command::Calibrate(arguments)) => calibrate::run(arguments),
+        Some(Command::Inspect(input)) => inspect(input).map(success),
+        Some(Command::Check(arguments)) => check::run(arguments),
+        Some(Command::Diff(arguments)) => difference::run(arguments),
+        Some(Command::Init(arguments)) => init(arguments).map(success),
+        Some(Command::Snapshot(arguments)) => snapshot(arguments).map(success),
+        Some(Command::Compare(compared)) => compare(compared, &arguments),
+        Some(Command::Stability(arguments)) => stability(arguments),
+        Some(Command::Calibrate(arguments)) => calibrate::run(arguments).map(success),
         #[cfg(feature = "mesh")]
-        Some(Command::Mesh(arguments)) => mesh::run(arguments),
+        Some(Command::Mesh(arguments)) => mesh::run(arguments).map(success),
         #[cfg(feature = "mesh")]
-        Some(Command::MeshError(arguments)) => mesh::error(arguments),
+        Some(Command::MeshError(arguments)) => mesh::error(arguments).map(success),
+        Some(Command::Completions(arguments)) => {
+            manual::completions(&arguments);
+            Ok(ExitCode::SUCCESS)
+        }
+        Some(Command::Man(arguments)) => manual::man(arguments).map(success),
         #[cfg(feature = "gpu")]
-        Some(Command::GpuWorker) => gpu_worker(),
+        Some(Command::GpuWorker) => gpu_worker().map(success),
         None => compile_command(cli.compile),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            print_diagnostic(&error);
-            ExitCode::from(2)
-        }
-    }
+    done.unwrap_or_else(|error| {
+        print_diagnostic(&error);
+        ExitCode::from(2)
+    })
 }
 
 fn print_diagnostic(diagnostic: &Diagnostic) {
@@ -764,9 +795,15 @@ fn stability(arguments: StabilityArgs) -> Result<ExitCode> {
     })
 }
 
-fn compile_command(arguments: CompileArgs) -> Result<()> {
-    let mut request = arguments.input.request()?;
-    request.output = arguments.output;
+fn compile_command(arguments: CompileArgs) -> Result<ExitCode> {
+    let (stages, modules) = arguments.reading.read()?;
+    let mut request = Request {
+        stages,
+        modules,
+        scene: arguments.scene,
+        lock: arguments.lock,
+        ..Request::default()
+    };
     request.bound = arguments.bound;
     request.parameters = arguments.host.contains(&HostWord::Parameters);
     request.textures = arguments.host.contains(&HostWord::Textures);
@@ -797,47 +834,99 @@ fn compile_command(arguments: CompileArgs) -> Result<()> {
     request.command = command_line();
     request.model = arguments.time.model.clone();
     request.time = arguments.time.run_time()?;
-    let quiet = arguments.quiet;
-    if arguments.locked {
-        let (files, warnings) = compile::locked(&request)?;
-        warnings
-            .iter()
-            .for_each(|warning| print_diagnostic(warning));
-        return write(&files, quiet);
+    let of_one = [
+        ("--lock", request.lock.is_some()),
+        ("--vertex-file", request.stages.vertex_file.is_some()),
+    ];
+    if let (2.., Some((flag, _))) = (
+        arguments.files.len(),
+        of_one.into_iter().find(|(_, given)| *given),
+    ) {
+        let error = format!("`{flag}` is that of one shader, and there are several");
+        return Err(Diagnostic::error(error).with_note("name one shader in a call"));
     }
-    let bar = Bar::new("searching", quiet);
-    let compiled = compile::compile(&request, &|progress| bar.show(progress));
+    let requests = arguments.files.into_iter().map(|shader| Request {
+        shader,
+        ..request.clone()
+    });
+    let requests = batch::placed(requests.collect(), arguments.output)?;
+    let quiet = arguments.quiet;
+    let rules = Mutex::new(BTreeMap::new());
+    let code = batch::each(arguments.jobs, &requests, |at, request| {
+        let mut said = Said::default();
+        let done = match arguments.locked {
+            true => replay(request, quiet, &mut said).map(|rule| {
+                let mut rules = rules.lock().unwrap_or_else(PoisonError::into_inner);
+                rules.insert(at, rule);
+            }),
+            false => search(request, quiet, requests.len(), &mut said),
+        };
+        if let Err(error) = done {
+            said.error = Some(error);
+            said.code = 2;
+        }
+        said
+    });
+    if let Some(file) = arguments.depfile.filter(|_| code == 0) {
+        let rules = rules.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let rules: Vec<Rule> = rules.into_values().collect();
+        emit::write_atomically(&[(file, depfile::text(&rules)?.into_bytes())])?;
+    }
+    Ok(ExitCode::from(code))
+}
+
+/// Writes what a lock makes, and says what it depends on.
+fn replay(request: &Request, quiet: bool, said: &mut Said) -> Result<Rule> {
+    let made = compile::remade(request)?;
+    said.warnings = made.warnings;
+    said.text = written(&made.files, quiet)?;
+    let outputs = made.files.into_iter().map(|(file, _)| file);
+    Ok(Rule {
+        outputs: outputs.collect(),
+        inputs: made.inputs,
+    })
+}
+
+/// Searches levels, one of `of` shaders.
+fn search(request: &Request, quiet: bool, of: usize, said: &mut Said) -> Result<()> {
+    let bar = Bar::new("searching", quiet || of > 1);
+    let compiled = compile::compile(request, &|progress| bar.show(progress));
     bar.finish();
     let compiled = compiled?;
-    compiled
-        .warnings
-        .iter()
-        .for_each(|warning| print_diagnostic(warning));
+    said.warnings = compiled.warnings;
     if !quiet {
-        print(&report::summary(&compiled.report));
+        said.text = report::summary(&compiled.report);
         if let Some(timings) = compiled.timings {
             let compile::Timings { taken, found, .. } = timings;
-            print(&format!(
+            said.text += &format!(
                 "  {:<16}{taken} taken, {found} found in what was timed before\n",
                 "timings"
-            ));
+            );
         }
     }
-    write(&compiled.files, quiet)?;
+    said.text += &written(&compiled.files, quiet)?;
     if !quiet {
-        print(&report::next(&compiled.report, compiled.output));
+        said.text += &report::next(&compiled.report, compiled.output);
     }
     Ok(())
 }
 
 fn write(files: &compile::Files, quiet: bool) -> Result<()> {
-    emit::write_atomically(files)?;
-    if !quiet {
-        let names: Vec<String> = files
-            .iter()
-            .map(|(file, _)| file.display().to_string())
-            .collect();
-        print(&format!("  wrote           {}\n", names.join("  ")));
-    }
+    print(&written(files, quiet)?);
     Ok(())
+}
+
+/// Writes files, and says which.
+fn written(files: &compile::Files, quiet: bool) -> Result<String> {
+    let written = emit::write_atomically(files)?;
+    let mut said = String::new();
+    for (what, is_written) in [("wrote", true), ("unchanged", false)] {
+        let names = files.iter().map(|(file, _)| file);
+        let names = names.filter(|file| written.contains(&file.as_path()) == is_written);
+        let names: Vec<String> = names.map(|file| file.display().to_string()).collect();
+        if !quiet && !names.is_empty() {
+            said += &format!("  {what:<16}{}\n", names.join("  "));
+        }
+    }
+    Ok(said)
 }

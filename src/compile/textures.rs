@@ -7,8 +7,6 @@ use std::path::PathBuf;
 
 #[cfg(feature = "search")]
 use crate::{eval::generated::GeneratedTextures, scene::Scene};
-#[cfg(feature = "search")]
-use std::path::Path;
 
 /// A texture that was made for levels, as a file.
 pub(crate) struct Made {
@@ -20,7 +18,7 @@ pub(crate) struct Made {
 
 impl Request {
     /// The folder of the textures that are made for levels.
-    fn textures(&self) -> PathBuf {
+    pub(super) fn textures(&self) -> PathBuf {
         self.beside("lod")
     }
 
@@ -81,7 +79,7 @@ pub(super) fn again(
     let made = made_again(request, read, textures)?;
     #[cfg(not(feature = "search"))]
     let made = on_disk(request, &read.lock, textures)?;
-    expect_as_locked(&read.lock, textures, &made)?;
+    expect_as_locked(&read.lock, &made)?;
     Ok(made)
 }
 
@@ -95,39 +93,43 @@ pub(crate) fn committed(
     textures: &[GeneratedTexture],
 ) -> Result<Vec<Made>> {
     let made = on_disk(request, lock, textures)?;
-    expect_as_locked(lock, textures, &made)?;
+    expect_as_locked(lock, &made)?;
     Ok(made)
 }
 
 /// Holds textures against what a lock says of them.
-fn expect_as_locked(lock: &Lock, textures: &[GeneratedTexture], made: &[Made]) -> Result<()> {
-    for (texture, made) in textures.iter().zip(made) {
-        let name = &texture.name;
-        let mut locked = lock.generated.iter();
-        let locked = locked.find(|locked| locked.name == *name);
-        if locked.is_none_or(|locked| locked.hash != made.locked.hash) {
-            return Err(Diagnostic::error(format!(
-                "the lock is stale: the texture `{name}` that was made for levels is not what it was"
-            ))
-            .with_note("renew it: run lodc without `--locked`, and commit what it writes"));
-        }
+fn expect_as_locked(lock: &Lock, made: &[Made]) -> Result<()> {
+    match made.iter().find(|made| !is_as_locked(lock, &made.locked)) {
+        Some(other) => Err(stale(&other.locked.name)),
+        None => Ok(()),
     }
-    Ok(())
 }
 
+/// Whether a texture is the one that a lock has under this name.
+pub(super) fn is_as_locked(lock: &Lock, made: &LockedGenerated) -> bool {
+    let mut locked = lock.generated.iter();
+    let locked = locked.find(|locked| locked.name == made.name);
+    locked.is_some_and(|locked| locked.hash == made.hash)
+}
+
+/// Says that the lock has another texture under a name.
+pub(super) fn stale(name: &str) -> Box<Diagnostic> {
+    Diagnostic::stale(format!(
+        "the texture `{name}` that was made for levels is not what it was"
+    ))
+    .with_note("renew it: run lodc without `--locked`, and commit what it writes")
+}
+
+/// Makes the textures of a lock again.
 #[cfg(feature = "search")]
-fn made_again(
+pub(super) fn made_again(
     request: &Request,
     read: &Relocked,
     textures: &[GeneratedTexture],
 ) -> Result<Vec<Made>> {
-    let lock = request.lock();
-    let folder = lock.parent().unwrap_or(Path::new(""));
-    let locked = read
-        .lock
-        .scene
-        .as_ref()
-        .map(|scene| folder.join(&scene.file));
+    let lock = request.committed_lock();
+    let locked = read.lock.scene.as_ref();
+    let locked = locked.map(|scene| lock.with_file_name(&scene.file));
     let scene = request.scene.clone().or(locked);
     make(&Scene::read(&read.source, scene.as_deref())?, textures)
 }
@@ -138,7 +140,9 @@ fn on_disk(request: &Request, lock: &Lock, textures: &[GeneratedTexture]) -> Res
         let mut locked = lock.generated.iter();
         let locked = locked.find(|locked| locked.name == texture.name);
         let locked = locked.cloned().unwrap_or_default();
-        let file = request.textures().join(&locked.file);
+        // `rock.lod` beside `rock.lod.toml`.
+        let folder = request.committed_lock().with_extension("");
+        let file = folder.join(&locked.file);
         let bytes = std::fs::read(&file).map_err(|error| {
             Diagnostic::error(format!("cannot read `{}`: {error}", file.display())).with_note(
                 "it was made for levels, and is committed with the lock: run lodc on the shader to make it again",

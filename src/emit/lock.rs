@@ -449,8 +449,8 @@ impl Lock {
     pub fn replay(&self, base: &Shader, name: &str, text: &str) -> Result<Vec<EmitLevel>> {
         let now = base.fingerprint().to_string();
         if now != self.source.normal_form {
-            let stale = Diagnostic::error(format!(
-                "the lock is stale: {} has changed since it was made",
+            let stale = Diagnostic::stale(format!(
+                "{} has changed since it was made",
                 self.source.file
             ))
             .with_source(name, text);
@@ -479,10 +479,14 @@ impl Lock {
                 Some(span) => error.with_label(span, failed.declined.0),
                 None => error.with_reason(failed.declined.0),
             };
-            error.with_note(format!(
+            let error = error.with_note(format!(
                 "make the lock again: run lodc on {} without `--locked`",
                 self.source.file
-            ))
+            ));
+            Box::new(Diagnostic {
+                is_stale: true,
+                ..*error
+            })
         };
         let start = self.exact.replay(base);
         let start = start.map_err(|failed| fails(failed, None))?;

@@ -1,29 +1,40 @@
-//! Writes files so that none is ever half written: beside the old one first, then renamed over it.
+//! Writes files so that none is ever half written: beside the old one first, then renamed over it. What is there already is not
+//! touched.
 
 use crate::{Diagnostic, Result};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Writes files, all or none. Missing folders are made. Every file is written under another name beside its
+/// Writes files, all or none, and says which: a file that has its contents already is left alone, so that whoever looks at times of
+/// modification has nothing to do. Missing folders are made. Every file is written under another name beside its
 /// place first; only when all are on the disk are they renamed.
 ///
 /// # Errors
 /// At the first file that cannot be written, with its path and the reason; then nothing has changed, unless it
 /// is a rename that failed, and even then every file is whole.
-pub fn write_atomically(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+pub fn write_atomically(files: &[(PathBuf, Vec<u8>)]) -> Result<Vec<&Path>> {
     writable(files)?;
+    let changed = files.iter().filter(|(path, bytes)| !is_there(path, bytes));
+    let changed: Vec<(&Path, &[u8])> = changed.map(|(path, bytes)| (&**path, &**bytes)).collect();
     let mut written = Written(Vec::new());
-    for (path, bytes) in files {
+    for (path, bytes) in &changed {
         make_folder(path)?;
         let beside = beside(path);
         written.0.push(beside.clone());
         fs::write(&beside, bytes).map_err(|e| failed(path, &e))?;
     }
-    for (beside, (path, _)) in written.0.iter().zip(files) {
+    for (beside, (path, _)) in written.0.iter().zip(&changed) {
         fs::rename(beside, path).map_err(|e| failed(path, &e))?;
     }
-    Ok(())
+    Ok(changed.into_iter().map(|(path, _)| path).collect())
+}
+
+/// Whether a file has these contents.
+fn is_there(path: &Path, bytes: &[u8]) -> bool {
+    let length = fs::metadata(path).map(|known| known.len());
+    length.is_ok_and(|length| length == bytes.len() as u64)
+        && fs::read(path).is_ok_and(|have| have == bytes)
 }
 
 /// Files that are taken away again if they are still there at the end.
@@ -123,6 +134,29 @@ mod tests {
             b"too"
         );
         assert_eq!(names(&folder), ["a", "deep"]);
+        fs::remove_dir_all(folder).expect("it goes");
+    }
+
+    #[test]
+    fn what_is_there_is_not_touched() {
+        let folder = folder("untouched");
+        let [same, other] = ["same", "other"].map(|name| folder.join(name));
+        for path in [&same, &other] {
+            fs::write(path, "old").expect("it is written");
+            let file = fs::File::options().write(true).open(path);
+            let long_ago = std::time::SystemTime::UNIX_EPOCH;
+            let set = file.expect("it is there").set_modified(long_ago);
+            set.expect("a time can be set");
+        }
+        let files = [(same.clone(), b"old".to_vec()), (other, b"new".to_vec())];
+        let written = write_atomically(&files).expect("it is written");
+        assert_eq!(written, [folder.join("other")]);
+        let modified = |name: &str| {
+            let known = fs::metadata(folder.join(name)).expect("it is there");
+            known.modified().expect("it has a time")
+        };
+        assert_eq!(modified("same"), std::time::SystemTime::UNIX_EPOCH);
+        assert!(modified("other") > std::time::SystemTime::UNIX_EPOCH);
         fs::remove_dir_all(folder).expect("it goes");
     }
 

@@ -5,6 +5,7 @@
 
 mod calibration;
 mod comparison;
+mod difference;
 mod exact;
 #[cfg(feature = "mesh")]
 mod joint;
@@ -14,6 +15,7 @@ mod terminal;
 
 pub use calibration::calibration;
 pub use comparison::{ComparedAt, Comparison};
+pub use difference::{BindingDifference, Fate, ShaderDifference, Totals, ValueAt, ValueDifference};
 #[cfg(feature = "mesh")]
 pub use joint::{JointReport, PricesReport, ScoreReport, WalkReport};
 #[cfg(feature = "mesh")]

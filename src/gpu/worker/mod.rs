@@ -182,6 +182,7 @@ impl Said {
             source: self.source,
             labels: self.labels,
             notes: self.notes,
+            is_stale: false,
         })
     }
 }
