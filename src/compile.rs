@@ -70,7 +70,7 @@ use crate::emit::{self, EmitLevel, Form, Lock, Output, Target, Transition};
 use crate::front::{self, Modules, Source, Stages};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Goal, Shader, normalize};
+use lodc_passes::{Goal, Passes, Shader, normalize};
 use std::path::{Path, PathBuf};
 
 /// How many expressions the normal form of an entry point may have, so that inlining cannot blow up.
@@ -156,6 +156,8 @@ pub struct Request {
     pub goal: Option<Goal>,
     /// The names of the passes that a level may cost error by; all when there are none.
     pub only: Vec<String>,
+    /// The passes that a search tries and that a lock may name: by default lodc's own.
+    pub passes: Passes,
     /// Whether the host fills the parameter block, beside what the scene says.
     pub parameters: bool,
     /// Whether the host binds textures that are made for levels, beside what the scene says.
@@ -496,7 +498,7 @@ pub(crate) fn replay(request: &Request) -> Result<Replayed> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let locked = read.as_ref().map(|(lock, _)| lock);
     let source = read_source(request, locked, folder)?;
-    let base = normal_form(&source)?;
+    let base = normal_form(&source)?.with_passes(request.passes.clone());
     let levels = match &read {
         None => Err(Lock::missing(&path)),
         Some((lock, text)) => {

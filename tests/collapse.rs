@@ -56,7 +56,7 @@ fn the_example_of_the_paper_becomes_one_constant_in_his_steps() {
     ] {
         let (_, shader) = &steps[steps.len() - 1];
         let facts = set.facts(shader);
-        let offered: Vec<Candidate> = recipe::pass(pass)
+        let offered: Vec<Candidate> = (shader.passes().of_name(pass))
             .expect("it is known")
             .candidates(shader, &facts);
         // The sky goes before the cloth, which is all that is left in the end.

@@ -163,7 +163,10 @@ fn a_thousand_random_recipes_are_valid_and_replay_to_the_same_bytes() {
             }
             let mut candidate = candidates[random.below(candidates.len())].clone();
             // A search changes numbers for better ones.
-            let pass = recipe::pass(&candidate.pass).expect("passes offer under their own names");
+            let pass = shader
+                .passes()
+                .of_name(&candidate.pass)
+                .expect("passes offer under their own names");
             let numbers: Vec<f32> = candidate.numbers().map(|n| n * 0.75 + 0.125).collect();
             if random.below(4) == 0
                 && let Some(better) = pass.with_numbers(&candidate, &numbers)
@@ -231,7 +234,11 @@ fn candidates_are_the_same_every_time_and_all_apply() {
                 "{}: {candidate} is offered twice",
                 subject.name
             );
-            let pass = recipe::pass(&candidate.pass).expect("passes offer under their own names");
+            let pass = subject
+                .shader
+                .passes()
+                .of_name(&candidate.pass)
+                .expect("passes offer under their own names");
             assert_eq!(
                 pass.applies(&subject.shader, candidate),
                 Ok(()),

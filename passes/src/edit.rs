@@ -469,7 +469,13 @@ impl<'a> Edit<'a> {
         self.module.entry_points[self.entry].function = function;
         let mut generated = self.shader.generated.clone();
         generated.append(&mut self.generated);
-        let shader = Shader::changed(self.module, ids, self.shader.authors, generated);
+        let shader = Shader::changed(
+            self.module,
+            ids,
+            self.shader.authors,
+            generated,
+            self.shader.passes.clone(),
+        );
         match self.stage {
             Stage::Fragment => parameters::settle(interface::settle(shader)),
             Stage::Vertex => parameters::settle(shader),

@@ -329,8 +329,8 @@ pub(crate) fn alone(shader: &Shader) -> Shader {
     if let Some(vertex) = shader.index(Stage::Vertex) {
         let locations = locations_read(&module, fragment, &read);
         handed = return_only(&mut module, vertex, &locations);
-        let generated = shader.generated.clone();
-        let shader = Shader::changed(module, ids, shader.authors, generated);
+        let (generated, passes) = (shader.generated.clone(), shader.passes.clone());
+        let shader = Shader::changed(module, ids, shader.authors, generated, passes);
         let shader = match handed {
             // What computed the others goes.
             Some(_) => Edit::new(&shader, Stage::Vertex).finish(),
@@ -341,7 +341,13 @@ pub(crate) fn alone(shader: &Shader) -> Shader {
         take_only(&mut module, vertex, &read, None);
     }
     take_only(&mut module, fragment, &read, handed);
-    Shader::changed(module, ids, shader.authors, shader.generated.clone())
+    Shader::changed(
+        module,
+        ids,
+        shader.authors,
+        shader.generated.clone(),
+        shader.passes.clone(),
+    )
 }
 
 /// What a stage reads of one of its arguments.
@@ -602,6 +608,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         ids,
         authors,
         generated,
+        passes,
         ..
     } = shader;
     let at_new = |binding: &Option<Binding>| -> Option<Binding> {
@@ -674,7 +681,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         }
     }
     module.entry_points[vertex].function = function;
-    let shader = Shader::changed(module, ids, authors, generated);
+    let shader = Shader::changed(module, ids, authors, generated, passes);
     match dropped {
         // What computed it goes.
         true => Edit::new(&shader, Stage::Vertex).finish(),

@@ -25,6 +25,7 @@ pub mod normalize;
 pub mod op_removal;
 pub mod operands;
 pub mod parameters;
+pub mod passes;
 mod places;
 pub mod rate;
 pub mod recipe;
@@ -43,11 +44,12 @@ pub use facts::Facts;
 pub use generated::Generated;
 pub use goal::{Goal, Used};
 pub use normalize::{NormalizeError, normalize, normalize_stages};
+pub use passes::Passes;
 pub use rate::{Rate, Rates};
 pub use recipe::{Candidate, Class, Considered, Declined, Pass, Recipe, ReplayError, Surviving};
 pub use shader::{Fingerprint, Shader, Stage, ValueId};
 
-/// Every pass, in the order in which candidates are listed.
+/// Every pass of lodc's own that asks nothing of the host, in the order in which candidates are listed. [`Passes`] adds those of a program.
 ///
 /// What costs no error goes first; then whole textures, because they are worth the most; then single operations.
 pub static PASSES: &[&dyn Pass] = &[
@@ -63,7 +65,7 @@ pub static WITH_PARAMETERS: &[&dyn Pass] = &[&to_parameter::ToParameter];
 /// Passes whose levels ask the host to bind textures that were made for them: they are searched where it does.
 pub static WITH_TEXTURES: &[&dyn Pass] = &[&texture_collapse::TextureCollapse];
 
-/// Every pass that there is.
+/// Every pass of lodc's own.
 pub fn all_passes() -> impl Iterator<Item = &'static dyn Pass> {
     let asking = WITH_TEXTURES.iter().chain(WITH_PARAMETERS);
     PASSES.iter().chain(asking).copied()

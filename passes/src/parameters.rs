@@ -295,7 +295,13 @@ pub(crate) fn with_stage(shader: &Shader) -> Shader {
         incoming_ray_payload: None,
     });
     shader.ids.push(Vec::new());
-    Shader::changed(shader.module, shader.ids, shader.authors, shader.generated)
+    Shader::changed(
+        shader.module,
+        shader.ids,
+        shader.authors,
+        shader.generated,
+        shader.passes,
+    )
 }
 
 /// A name for a member that no member has.
@@ -342,6 +348,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         mut ids,
         authors,
         generated,
+        passes,
         ..
     } = shader;
     let mut entries = module.entry_points.iter();
@@ -369,7 +376,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
                 }
             }
         }
-        return Shader::changed(module, ids, authors, generated);
+        return Shader::changed(module, ids, authors, generated, passes);
     }
     let ty = change(&mut module, block, members);
     for point in &mut module.entry_points {
@@ -395,7 +402,7 @@ pub(crate) fn settle(shader: Shader) -> Shader {
         let components = order.iter().map(|old| stored.values[*old]).collect();
         function.expressions[value] = Expression::Compose { ty, components };
     }
-    let shader = Shader::changed(module, ids, authors, generated);
+    let shader = Shader::changed(module, ids, authors, generated, passes);
     match dropped {
         // What computed it goes.
         true => Edit::new(&shader, Stage::Parameter).finish(),

@@ -1,7 +1,7 @@
 //! Candidates and recipes: one simplification as data, and an ordered list of them.
 
+use crate::Facts;
 use crate::shader::{Shader, ValueId};
-use crate::{Facts, PASSES, all_passes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -215,7 +215,7 @@ impl Recipe {
     /// Applies every candidate in order. A value that was renamed in the base since is found by its hash.
     ///
     /// # Errors
-    /// At the first candidate that names no pass or does not apply; nothing is skipped in silence.
+    /// At the first candidate that names no pass of the base or does not apply; nothing is skipped in silence.
     pub fn replay(&self, base: &Shader) -> Result<Shader, Box<ReplayError>> {
         self.replay_from(base, base)
     }
@@ -293,40 +293,32 @@ impl fmt::Display for ReplayError {
 
 impl std::error::Error for ReplayError {}
 
-/// Every candidate of every pass, pass by pass.
+/// Every candidate of a shader's passes, pass by pass; without those that ask a host for something.
 pub fn candidates(shader: &Shader, facts: &Facts) -> Vec<Candidate> {
-    PASSES
+    shader
+        .passes()
         .iter()
         .flat_map(|pass| pass.candidates(shader, facts))
         .collect()
 }
 
-/// Everything that the passes think of, by the value that it changes; pass by pass for each.
+/// Everything that a shader's passes think of, by the value that it changes; pass by pass for each.
 pub fn considered(shader: &Shader, facts: &Facts) -> BTreeMap<ValueId, Vec<Considered>> {
     let mut by_site: BTreeMap<ValueId, Vec<Considered>> = BTreeMap::new();
-    for considered in PASSES.iter().flat_map(|pass| pass.consider(shader, facts)) {
+    let passes = shader.passes().iter();
+    for considered in passes.flat_map(|pass| pass.consider(shader, facts)) {
         let site = considered.candidate.site.clone();
         by_site.entry(site).or_default().push(considered);
     }
     by_site
 }
 
-/// The pass of a command-line name.
-///
-/// # Errors
-/// When no pass has that name.
-pub fn pass(name: &str) -> Result<&'static dyn Pass, Declined> {
-    all_passes()
-        .find(|pass| pass.name() == name)
-        .ok_or_else(|| Declined(format!("there is no pass `{name}`")))
-}
-
 /// Applies one candidate through the pass that it names.
 ///
 /// # Errors
-/// When no pass has that name, or the pass declines.
+/// When the shader has no pass of that name, or the pass declines.
 pub fn apply(shader: &Shader, candidate: &Candidate) -> Result<Shader, Declined> {
-    let pass = pass(&candidate.pass)?;
+    let pass = shader.passes().of_name(&candidate.pass)?;
     pass.applies(shader, candidate)?;
     Ok(pass.apply(shader, candidate))
 }

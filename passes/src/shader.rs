@@ -8,6 +8,7 @@ use crate::flow::Findings;
 use crate::generated::Generated;
 use crate::interface::{self, Authors};
 use crate::operands::User;
+use crate::passes::Passes;
 use crate::places::Places;
 use naga::proc::{ResolveContext, TypeResolution};
 use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
@@ -126,6 +127,8 @@ pub struct Shader {
     pub(crate) authors: Authors,
     /// The textures that passes have made, in the order in which they were made.
     pub(crate) generated: Vec<Generated>,
+    /// The passes that may change it.
+    pub(crate) passes: Passes,
     /// For each entry point, what was found out about its function when first asked for.
     known: Arc<Vec<Known>>,
 }
@@ -143,7 +146,7 @@ impl Shader {
     /// id of each expression.
     pub(crate) fn new(module: Module, ids: Vec<Vec<ValueId>>) -> Self {
         let authors = Authors::of(&module);
-        Self::changed(module, ids, authors, Vec::new())
+        Self::changed(module, ids, authors, Vec::new(), Passes::default())
     }
 
     /// A variant of an author's shader.
@@ -152,6 +155,7 @@ impl Shader {
         ids: Vec<Vec<ValueId>>,
         authors: Authors,
         generated: Vec<Generated>,
+        passes: Passes,
     ) -> Self {
         let lengths = module
             .entry_points
@@ -168,7 +172,20 @@ impl Shader {
             ids,
             authors,
             generated,
+            passes,
         }
+    }
+
+    /// The passes that may change it, and that a recipe for it may name: [`crate::PASSES`], and what a program adds.
+    pub fn passes(&self) -> &Passes {
+        &self.passes
+    }
+
+    /// The same shader, which these passes may change; and so may they every variant of it.
+    #[must_use]
+    pub fn with_passes(mut self, passes: Passes) -> Self {
+        self.passes = passes;
+        self
     }
 
     /// The module. It holds a fragment entry point, a vertex entry point or not, in a variant one that fills the parameter

@@ -6,7 +6,7 @@ use crate::emit::Transition;
 use crate::front::names::nearest;
 use crate::search::{Kept, is_within};
 use crate::{Diagnostic, Result};
-use lodc_passes::{Stage, all_passes, specialize};
+use lodc_passes::{Passes, Stage, specialize};
 use naga::{Expression, Handle};
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ impl Ready {
     /// When a name is none of these or names no pass, and as [`Self::directives`].
     pub(super) fn kept(&self, request: &Request) -> Result<Kept> {
         let mut kept = Kept {
-            only: passes(&named(request))?,
+            only: passes(self.base.passes(), &named(request))?,
             unstable: request.unstable,
             same_vertex_stage: request.per_pixel,
             apart: request.transition.unwrap_or_default() != Transition::Pop,
@@ -133,8 +133,9 @@ fn named(request: &Request) -> Vec<String> {
 }
 
 /// The passes of these names.
-fn passes(names: &[String]) -> Result<BTreeSet<String>> {
-    let known: Vec<&str> = all_passes()
+fn passes(all: &Passes, names: &[String]) -> Result<BTreeSet<String>> {
+    let known: Vec<&str> = all
+        .all()
         .filter(|pass| !pass.is_exact())
         .map(|pass| pass.name())
         .collect();

@@ -20,7 +20,7 @@ use crate::search::{
 use crate::time::clock::{Clock, worst_ratio};
 use crate::{Diagnostic, Result};
 use lodc_passes::texture_collapse::MOST_TEXTURES;
-use lodc_passes::{Candidate, PASSES, Recipe, Shader, Stage, WITH_PARAMETERS, WITH_TEXTURES};
+use lodc_passes::{Candidate, Recipe, Shader, Stage};
 use naga::Expression;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ impl Read {
     fn of(request: Request, scene_file: Option<PathBuf>) -> Result<Self> {
         let source = Source::read_with(&request.shader, &request.stages, &request.modules)?;
         // What the evaluator cannot run is said before the scene asks for values of it.
-        let base = normal_form(&source)?;
+        let base = normal_form(&source)?.with_passes(request.passes.clone());
         fragment_program(&base).map_err(|refused| refusal(&refused, &source))?;
         Ok(Self {
             request,
@@ -732,10 +732,7 @@ pub fn inspect(request: &Request) -> Result<String> {
     let set = SampleSet::new(&stand, distance, Samples::Search)
         .map_err(|refused| refusal(&refused, &ready.source))?;
     let facts = set.facts(&ready.base);
-    let candidates: Vec<Candidate> = PASSES
-        .iter()
-        .chain(WITH_PARAMETERS)
-        .chain(WITH_TEXTURES)
+    let candidates: Vec<Candidate> = (ready.base.passes().asking(true, true))
         .flat_map(|pass| pass.candidates(&ready.base, &facts))
         .collect();
     let tried = search::try_each(&set, &ready.base, &candidates);

@@ -11,7 +11,7 @@ use super::{EmitLevel, Output, Transition};
 use crate::front::{Definition, read_text};
 use crate::{Diagnostic, Result};
 use lodc_passes::autolod::BoundReading;
-use lodc_passes::{Candidate, Goal, Recipe, ReplayError, Shader, all_passes};
+use lodc_passes::{Candidate, Goal, Recipe, ReplayError, Shader};
 use serde::Deserialize;
 use std::fmt::Write;
 use std::ops::Range;
@@ -348,8 +348,7 @@ impl Lock {
     /// Reads a lock from text; `name` is what messages call the file.
     ///
     /// # Errors
-    /// At its place, when it is not TOML, has an unknown or missing key, is of a newer format, names an unknown
-    /// pass, bakes a number that is no f32, or has thresholds that do not rise.
+    /// At its place, when it is not TOML, has an unknown or missing key, is of a newer format, bakes a number that is no f32, or has thresholds that do not rise.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let at = |message: String, span: Range<usize>, remark: &str| {
             Diagnostic::error(message)
@@ -445,7 +444,8 @@ impl Lock {
     /// so that errors can point into it.
     ///
     /// # Errors
-    /// When the source is no longer the one that the lock was made from, or a candidate no longer applies.
+    /// When the source is no longer the one that the lock was made from, when a recipe names a pass that
+    /// the base does not have, or a candidate no longer applies.
     pub fn replay(&self, base: &Shader, name: &str, text: &str) -> Result<Vec<EmitLevel>> {
         let now = base.fingerprint().to_string();
         if now != self.source.normal_form {
@@ -470,6 +470,24 @@ impl Lock {
         let fails = |failed: Box<ReplayError>, level: Option<usize>| {
             let (step, of) = (failed.step + 1, level.map(|at| self.number(at)));
             let of = of.map_or_else(|| "of what is exact".into(), |n| format!("of level {n}"));
+            let pass = &failed.candidate.pass;
+            if base.passes().of_name(pass).is_err() {
+                let known: Vec<&str> = base.passes().all().map(|pass| pass.name()).collect();
+                let error = Diagnostic::error(format!(
+                    "there is no pass `{pass}`, which step {step} {of} names"
+                ))
+                .with_source(name, text);
+                let error = match Places::of(text).place(level, failed.step) {
+                    Some(span) => error.with_label(span, "here"),
+                    None => error,
+                };
+                return error
+                    .with_note(format!("the passes are {}", known.join(", ")))
+                    .with_note(format!(
+                        "a pass of a program's own has to be in `Request::passes`, as when the lock was made; without it, run lodc on {} again",
+                        self.source.file
+                    ));
+            }
             let error = Diagnostic::error(format!(
                 "step {step} {of} no longer applies: {}",
                 failed.candidate
@@ -759,7 +777,7 @@ struct RawLevel {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawStep {
-    pass: Spanned<String>,
+    pass: String,
     site: String,
     choice: String,
     /// For people: not read.
@@ -774,15 +792,6 @@ type Located<'a> = dyn Fn(String, Range<usize>, &str) -> Box<Diagnostic> + 'a;
 
 impl RawStep {
     fn candidate(self, at: &Located<'_>) -> Result<Candidate> {
-        let known: Vec<&str> = all_passes().map(|pass| pass.name()).collect();
-        if !known.contains(&self.pass.get_ref().as_str()) {
-            return Err(at(
-                format!("there is no pass `{}`", self.pass.get_ref()),
-                self.pass.span(),
-                "unknown",
-            )
-            .with_note(format!("the passes are {}", known.join(", "))));
-        }
         let value = self
             .hex
             .into_iter()
@@ -800,7 +809,7 @@ impl RawStep {
             })
             .collect::<Result<Vec<u32>>>()?;
         Ok(Candidate {
-            pass: self.pass.into_inner(),
+            pass: self.pass,
             site: self.site.as_str().into(),
             choice: self.choice,
             value,
@@ -968,11 +977,6 @@ mod tests {
         fails("format = 0\n", "format 0", "0");
         fails(&good.replace("seed = ", "sead = "), "sead", "sead");
         fails(
-            &good.replace("\"op-removal\"", "\"no-such\""),
-            "no pass `no-such`",
-            "no-such",
-        );
-        fails(
             &good.replace("\"3dcccccd\"", "\"3dccccc\""),
             "`3dccccc` is not",
             "3dccccc",
@@ -1080,6 +1084,30 @@ mod tests {
             "{error}"
         );
         assert!(error.render(false).contains("a.lod.toml:"), "{error}");
+    }
+
+    #[test]
+    fn a_pass_that_is_not_there_is_named() {
+        let (base, mut lock) = small();
+        lock.levels[1].recipe = Recipe(vec![Candidate {
+            pass: "no-such".into(),
+            site: "main.shine".into(),
+            choice: "away".into(),
+            value: Vec::new(),
+        }]);
+        let text = lock.to_toml();
+        let error = lock
+            .replay(&base, "a.lod.toml", &text)
+            .expect_err("there is no such pass");
+        assert!(
+            error.message.contains("there is no pass `no-such`"),
+            "{error}"
+        );
+        assert!(
+            text[error.labels[0].0.clone()].contains("no-such"),
+            "{error}"
+        );
+        assert!(error.notes[1].contains("`Request::passes`"), "{error}");
     }
 
     #[test]

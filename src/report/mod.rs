@@ -27,7 +27,6 @@ use crate::error::{ErrorFigures, HeldOut};
 use crate::front::{Place, Source};
 use crate::search::{AtDistance, Found, Level, work_of};
 use crate::time::{Timing, TimingWarning, Verdict};
-use lodc_passes::recipe::pass;
 use lodc_passes::{Class, Goal, Recipe, Shader, Stage};
 use serde::Serialize;
 
@@ -617,7 +616,9 @@ fn steps(recipe: &Recipe, error_after: &[f64], base: &Shader, source: &Source) -
             pass: candidate.pass.clone(),
             site: candidate.site.to_string(),
             choice: candidate.choice.clone(),
-            class: pass(&candidate.pass).map(|pass| pass.class(candidate)).ok(),
+            class: (base.passes().of_name(&candidate.pass))
+                .map(|pass| pass.class(candidate))
+                .ok(),
             file: place
                 .as_ref()
                 .filter(|place| !place.is_in_main())

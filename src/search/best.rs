@@ -41,7 +41,7 @@ pub(super) fn best(
     candidate: &Candidate,
     measured: &Measured,
 ) -> Option<Better> {
-    let pass = recipe::pass(&candidate.pass).ok()?;
+    let pass = shader.passes().of_name(&candidate.pass).ok()?;
     let made = |numbers: &[f32]| -> Option<(Candidate, Shader)> {
         let other = pass.with_numbers(candidate, numbers)?;
         let made = recipe::apply(shader, &other).ok()?;
@@ -196,7 +196,7 @@ mod tests {
         let number = |candidate: &Candidate| candidate.numbers().next().unwrap_or(f32::NAN);
         // No constant nearby does better.
         for part in [0.85, 1.15] {
-            let pass = recipe::pass(&mean.pass).expect("it has one");
+            let pass = base.passes().of_name(&mean.pass).expect("it has one");
             let moved = pass
                 .with_numbers(mean, &[part * number(&best.candidate)])
                 .expect("a constant is free");

@@ -13,7 +13,7 @@ use crate::eval::programs::Stand;
 use crate::eval::raster::hand_over_the_same;
 use lodc_passes::recipe::{self, Considered};
 use lodc_passes::texture_removal::TextureRemoval;
-use lodc_passes::{Candidate, PASSES, Pass, Recipe, Shader, Stage, Used, Work, cost, specialize};
+use lodc_passes::{Candidate, Pass, Recipe, Shader, Stage, Used, Work, cost, specialize};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -241,7 +241,7 @@ fn offered(sets: &[SampleSet<'_>], shader: &Shader, stage: Stage) -> Vec<Candida
             Stage::Vertex => set.vertex_facts(shader),
             _ => set.facts(shader),
         };
-        let free = PASSES.iter().flat_map(|pass| {
+        let free = shader.passes().iter().flat_map(|pass| {
             let candidates = pass.candidates(shader, &facts).into_iter();
             candidates.filter(|c| pass.is_free(c) && specialize::stage(shader, c) == Some(stage))
         });
@@ -257,7 +257,7 @@ fn offered(sets: &[SampleSet<'_>], shader: &Shader, stage: Stage) -> Vec<Candida
 /// What the exact passes still think of, and decline.
 fn declined(set: &SampleSet<'_>, shader: &Shader) -> Vec<Considered> {
     let facts = set.facts(shader);
-    let passes = PASSES.iter().filter(|pass| pass.is_exact());
+    let passes = shader.passes().iter().filter(|pass| pass.is_exact());
     let considered = passes.flat_map(|pass| pass.consider(shader, &facts));
     let of_fragments =
         |c: &Considered| specialize::stage(shader, &c.candidate) == Some(Stage::Fragment);

@@ -16,9 +16,7 @@ use super::interval::Interval;
 use super::parameters;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
-use lodc_passes::{
-    Candidate, Fingerprint, PASSES, Recipe, Shader, WITH_PARAMETERS, WITH_TEXTURES, recipe,
-};
+use lodc_passes::{Candidate, Fingerprint, Recipe, Shader, recipe};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -187,12 +185,9 @@ impl Descent<'_, '_> {
             let facts = self.interval.start().facts(&current.shader);
             // What is exact was done before, or is not wanted.
             let host = self.interval.start().stand.scene.host;
-            let asking = WITH_PARAMETERS.iter();
-            let asking = asking.filter(|_| self.asks && host.parameters);
-            let making = WITH_TEXTURES.iter();
-            let making = making.filter(|_| self.asks && host.textures);
-            let passes = PASSES.iter().filter(|pass| !pass.is_exact());
-            let passes = passes.chain(asking).chain(making);
+            let (parameters, textures) = (self.asks && host.parameters, self.asks && host.textures);
+            let passes = current.shader.passes().asking(parameters, textures);
+            let passes = passes.filter(|pass| !pass.is_exact());
             let kept = self.guard.kept();
             let candidates: Vec<Candidate> = passes
                 .filter(|pass| kept.admits(pass.name()))
@@ -341,7 +336,8 @@ impl Step<'_> {
                     Some(measured) => *measured,
                     None => descent.interval.measure(&shader).ok()?,
                 };
-                if recipe::pass(&candidate.pass).is_ok_and(|pass| pass.guesses(candidate))
+                let pass = self.current.shader.passes().of_name(&candidate.pass);
+                if pass.is_ok_and(|pass| pass.guesses(candidate))
                     && let Some(better) =
                         best(descent.interval, &self.current.shader, candidate, &measured)
                 {

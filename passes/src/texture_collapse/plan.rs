@@ -427,7 +427,13 @@ impl<'a> Plan<'a> {
         }];
         let authors = Authors::of(&module);
         let generated = flow.shader.generated.clone();
-        let empty = Shader::changed(module, vec![Vec::new()], authors, generated);
+        let empty = Shader::changed(
+            module,
+            vec![Vec::new()],
+            authors,
+            generated,
+            flow.shader.passes.clone(),
+        );
 
         let mut edit = Edit::new(&empty, STAGE);
         let argument = |edit: &mut Edit<'_>, at: u32| {
