@@ -106,7 +106,9 @@ impl Compiler {
     /// The lock, where it is not beside the shader. What is written is called as the lock is.
     #[must_use]
     pub fn lock(mut self, file: impl Into<PathBuf>) -> Self {
-        self.request.output = Some(file.into());
+        let file = file.into();
+        self.request.lock = Some(file.clone());
+        self.request.output = Some(file);
         self
     }
 
@@ -311,7 +313,7 @@ impl Compiler {
 
     /// The files whose change changes the result.
     fn read(&self, request: &Request, replayed: &Replayed) -> Vec<PathBuf> {
-        let path = request.lock();
+        let path = request.committed_lock();
         let folder = path.parent().unwrap_or(Path::new(""));
         let source = &replayed.source;
         let mut read = vec![request.shader.clone()];
@@ -340,6 +342,7 @@ impl Compiler {
         let stem = self.request.stem();
         let request = Request {
             output: Some(folder.join(format!("{stem}.lod.wgsl"))),
+            lock: Some(folder.join(format!("{stem}.lod.toml"))),
             ..self.request.clone()
         };
         let is_there = request.lock().exists() && compile::replay(&request)?.levels.is_ok();
@@ -363,7 +366,7 @@ fn committed_meshes(request: &Request, lock: &Lock) -> Result<Option<(String, Ve
     let Some(meshes) = &lock.meshes else {
         return Ok(None);
     };
-    let path = request.lock();
+    let path = request.committed_lock();
     let file = path.parent().unwrap_or(Path::new("")).join(&meshes.file);
     let shown = file.display();
     let bytes = std::fs::read(&file).map_err(|error| {

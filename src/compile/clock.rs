@@ -99,6 +99,10 @@ struct Text {
 /// A mesh as it is handed to a device.
 #[derive(Clone)]
 struct MeshFile {
+    #[cfg_attr(
+        not(feature = "gpu"),
+        allow(dead_code, reason = "recordings know it by its hash")
+    )]
     bytes: Vec<u8>,
     hash: String,
 }

@@ -4,15 +4,24 @@
 //! Drivers have roundings and a `pow` of their own, fuse operations and flush denormals. What WGSL allows of that the eight rough
 //! arithmetics cover; this is what an adapter does.
 
+#[cfg(feature = "gpu")]
 use super::fed::Fed;
-use super::inputs::{Group, Interface};
-use super::run::{Failure, Given};
+use super::inputs::Group;
+#[cfg(feature = "gpu")]
+use super::inputs::Interface;
+use super::run::Failure;
+#[cfg(feature = "gpu")]
+use super::run::Given;
 use super::{Battery, Blamed, Inputs, Reach};
+#[cfg(feature = "gpu")]
 use crate::eval::program::Program;
+#[cfg(feature = "gpu")]
 use crate::eval::raster::on_spots;
+#[cfg(feature = "gpu")]
 use crate::scene::Scene;
 use lodc_passes::{Recipe, Shader};
 use serde::{Deserialize, Serialize};
+#[cfg(feature = "gpu")]
 use std::borrow::Cow;
 
 /// Inputs that another renderer is asked about, in groups that share their uniforms.
@@ -33,6 +42,7 @@ impl Asked {
     }
 
     /// The inputs of a fragment stage, whose vertices are computed so, one frame for each group.
+    #[cfg(feature = "gpu")]
     pub(crate) fn fed(&self, scene: &Scene, vertex: &Program, fragment: &Program) -> Vec<Fed> {
         let interface = Interface::new(scene, scene.seed);
         let of_group = |group: &Group| {

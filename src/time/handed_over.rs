@@ -1,5 +1,6 @@
 //! A mesh as bytes, from a search to the process that times it.
 
+#[cfg(feature = "gpu")]
 use crate::{Diagnostic, Result};
 use lodc_mesh::{Draw, Mesh};
 use serde::{Deserialize, Serialize};
