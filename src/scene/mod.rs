@@ -602,7 +602,9 @@ impl Scene {
         }
     }
 
-    fn frame(&self, direction: DVec3, distance: f64, draw: Draw) -> Frame {
+    /// The picture from a direction, a unit vector from the sphere's centre to the eye, at a distance from there, with these values of
+    /// the sampled uniforms. It is drawn at pixel centres, one sample a pixel.
+    pub fn frame(&self, direction: DVec3, distance: f64, draw: Draw) -> Frame {
         let pose = self.pose(direction, distance);
         let mut bindings = self.constant.clone();
         for buffer in self.buffers.iter().filter(|b| !b.is_constant()) {
