@@ -6,7 +6,7 @@ use std::time::Instant;
 
 fn main() -> lodc::Result<()> {
     let start = Instant::now();
-    Compiler::new("shaders/wall.wgsl").build()?;
+    Compiler::new("shaders/wall.wgsl").bytemuck(true).build()?;
     let wall = start.elapsed();
     Compiler::new("shaders/board.wgsl").bytemuck(true).build()?;
     let board = start.elapsed() - wall;
