@@ -99,7 +99,11 @@ impl Diagnostic {
         self
     }
 
-    /// The whole message as text, with colour codes for a terminal or without.
+    /// The whole message as text, with colour codes for a terminal, which take the feature `cli`, or without.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(unused_variables, reason = "there is no terminal")
+    )]
     pub fn render(&self, colour: bool) -> String {
         let report = match self.severity {
             Severity::Error => Report::error(),
@@ -132,13 +136,14 @@ impl Diagnostic {
         let report = report.with_labels(labels);
         let config = term::Config::default();
         let file = SimpleFile::new(name, text);
-        let rendered = if colour {
+        #[cfg(feature = "cli")]
+        if colour {
             let mut out = codespan_reporting::term::termcolor::Ansi::new(Vec::new());
-            let done = term::emit_to_write_style(&mut out, &config, &file, &report);
-            done.map(|()| String::from_utf8_lossy(&out.into_inner()).into_owned())
-        } else {
-            term::emit_into_string(&config, &file, &report)
-        };
+            if term::emit_to_write_style(&mut out, &config, &file, &report).is_ok() {
+                return String::from_utf8_lossy(&out.into_inner()).into_owned();
+            }
+        }
+        let rendered = term::emit_into_string(&config, &file, &report);
         rendered.unwrap_or_else(|_| format!("{}\n", self.message))
     }
 }

@@ -115,6 +115,15 @@ impl Material {
         autolod::middle(&self.thresholds, level)
     }
 
+    /// A distance at which a level is drawn: where autoLOD is in the middle of its interval, in pictures so many pixels high.
+    pub(crate) fn distance(&self, level: usize, height: u32) -> f64 {
+        let view = View {
+            height: f64::from(height),
+            ..self.scene.view(self.scene.nearest)
+        };
+        autolod::distance_of(self.constant(level), self.rho0, &view)
+    }
+
     /// Everything that a draw reads, seen from a direction and a distance.
     pub(crate) fn frame(&self, direction: glam::DVec3, distance: f64) -> Frame {
         self.scene.frame(direction, distance, Draw::Listed(0))

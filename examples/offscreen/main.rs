@@ -8,6 +8,10 @@
 //! They go to `target/offscreen/`. What a renderer has to do for levels is in `drawing`; this is the loop around it.
 
 #[path = "../drawing/mod.rs"]
+#[allow(
+    dead_code,
+    reason = "every example takes what it needs of what they share"
+)]
 mod drawing;
 
 use drawing::{Material, Renderer, Result, instance, open};

@@ -8,8 +8,6 @@
 //! autoLOD --distance_of--> distance --bound--> the error that is allowed there
 //! ```
 
-use glam::Mat4;
-
 /// How the error of a level is held against what [`bound`] allows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -85,10 +83,10 @@ pub fn distance_of(auto_lod: f64, rho0: f64, view: &View) -> f64 {
     view.radius + view.s_max * focal / rho0 * libm::exp2(auto_lod)
 }
 
-/// The largest singular value of a model matrix's linear part: the most that it stretches any direction.
-pub fn s_max(model: &Mat4) -> f64 {
-    let columns = [model.x_axis, model.y_axis, model.z_axis]
-        .map(|c| [f64::from(c.x), f64::from(c.y), f64::from(c.z)]);
+/// The largest singular value of a model matrix's linear part: the most that it stretches any direction. The matrix is given column
+/// by column.
+pub fn s_max(model: &[[f32; 4]; 4]) -> f64 {
+    let columns = [model[0], model[1], model[2]].map(|[x, y, z, _]| [x, y, z].map(f64::from));
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     // The squares of the singular values are the eigenvalues of the transpose times the matrix.
     let mut a: [[f64; 3]; 3] = columns.map(|i| columns.map(|j| dot(i, j)));
@@ -179,7 +177,7 @@ pub fn distances(nearest: f64, farthest: f64, count: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{Quat, Vec3};
+    use glam::{Mat4, Quat, Vec3};
 
     const VIEW: View = View {
         s_max: 1.0,
@@ -253,6 +251,7 @@ mod tests {
 
     #[test]
     fn s_max_is_the_largest_stretch() {
+        let s_max = |model: &Mat4| s_max(&model.to_cols_array_2d());
         let turned = Mat4::from_scale_rotation_translation(
             Vec3::new(0.5, 3.0, 2.0),
             Quat::from_euler(glam::EulerRot::XYZ, 0.4, 1.1, -2.0),

@@ -146,7 +146,7 @@ impl Ready {
         }
         let sight = Sight {
             fov: self.scene.fov,
-            scale: s_max(&self.scene.model.as_mat4()),
+            scale: s_max(&self.scene.model.as_mat4().to_cols_array_2d()),
             ..Sight::default()
         };
         let levels: Vec<Level<'_>> = (runs.iter().enumerate())

@@ -8,6 +8,7 @@
 //!
 //! Whatever is wrong is said at its place in the user's file.
 
+pub(crate) mod digest;
 mod entry;
 mod feed;
 mod files;
@@ -399,7 +400,7 @@ impl Text {
 
 /// The hash of a file's contents, as locks and reports hold it: `blake3:` and 64 hexadecimal digits.
 pub fn hash(bytes: &[u8]) -> String {
-    format!("blake3:{}", blake3::hash(bytes).to_hex())
+    format!("blake3:{}", digest::digest(bytes))
 }
 
 /// Reads a text file that the user named. `kind` says what it should be: `shader`, `scene`.

@@ -712,7 +712,7 @@ impl Scene {
     /// What autoLOD is computed from at a distance.
     pub fn view(&self, distance: f64) -> autolod::View {
         autolod::View {
-            s_max: autolod::s_max(&self.model.as_mat4()),
+            s_max: autolod::s_max(&self.model.as_mat4().to_cols_array_2d()),
             distance,
             radius: self.sphere.radius,
             // Not the camera's near plane, which moves with the object: the nearest that it can be.

@@ -141,7 +141,7 @@ impl Settings {
         let local = bounding_sphere(&mesh);
         let sphere = Sphere {
             centre: model.transform_point3(local.centre),
-            radius: local.radius * autolod::s_max(&model.as_mat4()),
+            radius: local.radius * autolod::s_max(&model.as_mat4().to_cols_array_2d()),
         };
         let resolution = match &file.resolution {
             None => [256; 2],
@@ -292,7 +292,7 @@ fn read_model(toml: Toml, file: &SceneFile) -> Result<DMat4> {
     };
     let model = DMat4::from_cols_array_2d(columns.get_ref());
     let affine = model.row(3) == glam::DVec4::W;
-    let size = autolod::s_max(&model.as_mat4());
+    let size = autolod::s_max(&model.as_mat4().to_cols_array_2d());
     if !model.is_finite() || !affine || !size.is_finite() || size <= 0.0 {
         return Err(toml
             .error(

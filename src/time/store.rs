@@ -11,6 +11,7 @@
 //! and of two that write the same, one wins. What cannot be read is timed again.
 
 use super::Timing;
+use crate::front::digest::digest;
 use crate::{Diagnostic, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,12 +33,12 @@ pub struct Key(String);
 impl Key {
     /// The key of parts, in their order. No two lists of parts have the same.
     pub fn of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
-        let mut hasher = blake3::Hasher::new();
+        let mut all = Vec::new();
         for part in parts {
-            hasher.update(&(part.len() as u64).to_le_bytes());
-            hasher.update(part);
+            all.extend_from_slice(&(part.len() as u64).to_le_bytes());
+            all.extend_from_slice(part);
         }
-        Self(hasher.finalize().to_hex()[..40].to_owned())
+        Self(digest(&all)[..40].to_owned())
     }
 }
 
