@@ -90,6 +90,35 @@ fn a_difference_is_a_diff_and_blessing_writes_it() {
 }
 
 #[test]
+fn files_of_levels_that_are_gone_are_named() {
+    let folder = built("left", 1);
+    let made = lodc(&folder, &["--locked", "--form", "files", "m0.wgsl"]);
+    assert_eq!(made.0, Some(0), "{made:?}");
+    let files = ["check", "--form", "files", "m0.wgsl"];
+    assert_eq!(lodc(&folder, &files).0, Some(0));
+    fs::create_dir_all(folder.join("m0.lod")).expect("it can be made");
+    // Neither a level's nor of this material: nobody's affair.
+    for name in ["m0.lod9.txt", "m0.lodged.wgsl", "m01.lod9.wgsl"] {
+        fs::write(folder.join(name), "").expect("it can be written");
+    }
+    assert_eq!(lodc(&folder, &files).0, Some(0));
+    let left = ["m0.lod/old.png", "m0.lod9.wgsl"];
+    for name in left {
+        fs::write(folder.join(name), "").expect("it can be written");
+    }
+    let says = |name| format!("{name}: is left over: no level of the lock has it, delete it\n");
+    let expected = left.map(says).concat();
+    let (code, out, error) = lodc(&folder, &files);
+    assert_eq!((code, &*out, &*error), (Some(1), &*expected, ""));
+    // Nothing is deleted but by a person.
+    let (code, out, _) = lodc(&folder, &[&files[..], &["--bless"]].concat());
+    assert_eq!((code, out), (Some(1), expected));
+    // A shader in one file has no others, and may stand beside those of another form.
+    let (code, out, _) = lodc(&folder, &["check", "m0.wgsl"]);
+    assert_eq!((code, out), (Some(1), says(left[0])));
+}
+
+#[test]
 fn a_stale_lock_fails_the_check_and_bad_input_is_worse() {
     let folder = built("stale", 2);
     let path = folder.join("m0.wgsl");

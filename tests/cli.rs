@@ -1,4 +1,4 @@
-//! Bad input at the command line: a located message, exit code 2, and no file touched.
+//! Bad input at the command line: a located message, exit code 2, and no file touched; and what shells complete.
 //!
 //! Every `testdata/errors/<case>` is one run in a copy of that folder. Its arguments are the first line of
 //! `<case>.args`; without one they are `<case>.wgsl`, or, when there is only a `<case>.toml`,
@@ -115,4 +115,18 @@ fn bad_input_is_located_and_loses_nothing() {
         goldens.wrong(format!("{orphan}.stderr belongs to no case"));
     }
     goldens.finish();
+}
+
+#[test]
+fn completions_name_the_commands_that_are_for_people() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let said = Command::new(env!("CARGO_BIN_EXE_lodc"))
+            .args(["completions", shell])
+            .output()
+            .expect("lodc starts");
+        assert!(said.status.success(), "{shell}");
+        let script = String::from_utf8(said.stdout).expect("a script is text");
+        assert!(script.contains("snapshot"), "{shell}");
+        assert!(!script.contains("gpu-worker"), "{shell}");
+    }
 }

@@ -78,10 +78,6 @@ enum Command {
     Completions(manual::CompletionsArgs),
     /// Prints a page of the manual, of lodc or of one of its commands
     Man(manual::ManArgs),
-    /// Draws on the GPU for the process that started it
-    #[cfg(feature = "gpu")]
-    #[command(hide = true)]
-    GpuWorker,
 }
 
 #[derive(Debug, Args)]
@@ -534,6 +530,11 @@ enum HostWord {
 /// Runs the tool. Exit code 0: done; 1: a check failed; 2: bad input or usage.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    // No command for people, so that neither help nor completions know it.
+    #[cfg(feature = "gpu")]
+    if matches!(&arguments[..], [_, only] if only == crate::gpu::worker::ARGUMENT) {
+        return ended(gpu_worker().map(|()| ExitCode::SUCCESS));
+    }
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
@@ -560,10 +561,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             Ok(ExitCode::SUCCESS)
         }
         Some(Command::Man(arguments)) => manual::man(arguments).map(success),
-        #[cfg(feature = "gpu")]
-        Some(Command::GpuWorker) => gpu_worker().map(success),
         None => compile_command(cli.compile),
     };
+    ended(done)
+}
+
+/// The exit code of what was done, once what went wrong has been said.
+fn ended(done: Result<ExitCode>) -> ExitCode {
     done.unwrap_or_else(|error| {
         print_diagnostic(&error);
         ExitCode::from(2)

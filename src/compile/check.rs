@@ -5,7 +5,7 @@
 //! ```
 
 use super::{Files, LOCK_ENDING, Relocked, Request, read_lock, textures};
-use crate::emit::{self, GeneratedTexture, Lock, Target};
+use crate::emit::{self, Form, GeneratedTexture, Lock, Target};
 #[cfg(feature = "search")]
 use crate::eval::texture::Texture;
 use crate::{Diagnostic, Result, front};
@@ -84,8 +84,80 @@ pub fn check(request: &Request) -> Result<Check> {
         let what = of_hash(&path, &meshes.hash)?;
         check.take(path, what, None);
     }
+    let left = left_over(&request.textures(), &|_| true)?;
+    let left = left.into_iter().chain(match emission.form {
+        Form::Files => request.of_gone_levels(&check.files)?,
+        Form::Override | Form::Uniform => Vec::new(),
+    });
+    for path in left {
+        let is_made = |made: &PathBuf| is_same(made, &path);
+        if !check.files.iter().any(is_made) {
+            let what = says(
+                &path,
+                "is left over: no level of the lock has it, delete it",
+            );
+            check.differences.push(Difference {
+                path,
+                what,
+                bytes: None,
+            });
+        }
+    }
     check.warnings = read.warnings;
     Ok(check)
+}
+
+/// Whether two paths lead to one file.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| path.canonicalize().ok();
+    one == other || place(one).is_some_and(|one| place(other) == Some(one))
+}
+
+/// The files of a folder whose names are meant, sorted; none when there is no folder.
+fn left_over(folder: &Path, is_meant: &dyn Fn(&str) -> bool) -> Result<Vec<PathBuf>> {
+    let failed = |error: std::io::Error| {
+        Diagnostic::error(format!(
+            "cannot read the folder `{}`: {error}",
+            folder.display()
+        ))
+    };
+    // The folder of a bare file name is empty, and means the current one.
+    let here = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    };
+    let entries = match std::fs::read_dir(here) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(failed(error)),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let name = entry.map_err(failed)?.file_name();
+        let path = folder.join(&name);
+        let name = name.to_string_lossy();
+        if !name.starts_with('.') && is_meant(&name) && path.is_file() {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+impl Request {
+    /// The files beside the outputs that are called as those of single levels are, `rock.lod3.wgsl`, and end as one of these.
+    fn of_gone_levels(&self, made: &[PathBuf]) -> Result<Vec<PathBuf>> {
+        let lock = self.lock();
+        let start = format!("{}.lod", self.stem());
+        left_over(lock.parent().unwrap_or(Path::new("")), &|name| {
+            let behind = name.strip_prefix(&start).unwrap_or_default();
+            let number = behind.find('.').map_or("", |dot| &behind[..dot]);
+            let extension = Path::new(name).extension();
+            !number.is_empty()
+                && number.bytes().all(|digit| digit.is_ascii_digit())
+                && made.iter().any(|made| made.extension() == extension)
+        })
+    }
 }
 
 impl Check {

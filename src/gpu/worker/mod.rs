@@ -25,6 +25,9 @@ use std::io::{Read, Write};
 use std::ops::Range;
 use std::path::PathBuf;
 
+/// The only argument of the child.
+pub const ARGUMENT: &str = "gpu-worker";
+
 /// A shader and its scene, by the files that they are read from: what the child draws in.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Subject {

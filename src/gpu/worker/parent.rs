@@ -295,7 +295,7 @@ impl Worker {
 impl Running {
     fn start(program: &PathBuf) -> Result<Self, Failure> {
         let mut child = Command::new(program)
-            .arg("gpu-worker")
+            .arg(super::ARGUMENT)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
