@@ -84,6 +84,7 @@ const LOCK_ENDING: &str = ".lod.toml";
 #[cfg(feature = "mesh")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Strategy {
     /// Shaders alone, on the scene's mesh.
     #[default]

@@ -37,6 +37,7 @@ pub struct CalibrateRequest {
 
 /// What calibrating gives.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Calibrated {
     /// The calibration, to be written where a file was asked for.
     pub files: Files,
@@ -56,6 +57,7 @@ pub struct Calibrated {
 
 /// How far it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Calibrating<'a> {
     /// The shader that is timed.
     pub shader: &'a str,

@@ -60,6 +60,7 @@ pub enum DrawnBy {
 
 /// What a comparison gives.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Compared {
     /// The pictures, to be written.
     pub files: Files,

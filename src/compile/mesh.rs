@@ -16,6 +16,7 @@ const SAMPLES: usize = 100_000;
 
 /// A length in a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Length {
     /// In the model's units.
     Units(f64),
@@ -45,6 +46,7 @@ impl Length {
 
 /// How far the levels of a mesh go, the least simplified first.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum MeshGoals {
     /// As far as no point of either surface is farther than this from the other, which is proved.
     Bounds(Vec<Length>),
@@ -73,6 +75,7 @@ pub struct MeshRequest {
 
 /// A level of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MeshLevel {
     /// How many triangles it has.
     pub triangles: usize,
@@ -91,6 +94,7 @@ pub struct MeshLevel {
 
 /// What simplifying a mesh gives.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct SimplifiedMesh {
     /// What is to be written.
     pub files: Files,
@@ -102,6 +106,7 @@ pub struct SimplifiedMesh {
 
 /// How far a simplification is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Simplifying {
     /// The level that is made, from 1.
     pub level: usize,
@@ -246,6 +251,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 
 /// How far two meshes are apart.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct MeshError {
     /// How many triangles the original and the other have.
     pub triangles: [usize; 2],

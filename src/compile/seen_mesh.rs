@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 
 /// How far levels go by their pictures.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum PictureGoals {
     /// A level for each distance of the scene, within the bound there.
     Scene,
@@ -45,6 +46,7 @@ pub struct PictureRequest {
 
 /// A level of a mesh, by its pictures.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PictureLevel {
     /// How many triangles it has.
     pub triangles: usize,
@@ -68,6 +70,7 @@ pub struct PictureLevel {
 
 /// What simplifying a mesh by its pictures gives.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct SeenMesh {
     /// What is to be written.
     pub files: Files,
@@ -81,6 +84,7 @@ pub struct SeenMesh {
 
 /// How far that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Seeing {
     /// The level that is made, from 1.
     pub level: usize,

@@ -23,6 +23,7 @@ pub struct StabilityRequest {
 
 /// What a device made of a level.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum OnDevice {
     /// It was asked.
     Asked {
@@ -37,6 +38,7 @@ pub enum OnDevice {
 
 /// What was found.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Stability {
     /// How the original stands, and those of its inputs that something is wrong with.
     pub original: Judged,

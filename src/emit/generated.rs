@@ -19,6 +19,7 @@ const OTHERS: u32 = 3;
 
 /// A generated texture of a result.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct GeneratedTexture {
     /// The name of its variable.
     pub name: String,

@@ -23,6 +23,7 @@ pub const FORMAT: u32 = 1;
 
 /// A result that can be made again without searching.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Lock {
     /// The shader that it was made from.
     pub source: LockedSource,
@@ -60,6 +61,7 @@ pub struct Lock {
 
 /// The shader of a lock.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LockedSource {
     /// The file, relative to the lock.
     pub file: String,
@@ -85,6 +87,7 @@ pub struct LockedModules {
 /// A file of a lock.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct LockedFile {
     /// The file, relative to the lock.
     pub file: String,
@@ -95,6 +98,7 @@ pub struct LockedFile {
 /// A texture of a lock.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct LockedTexture {
     /// The variable in the shader.
     pub name: String,
@@ -130,6 +134,7 @@ pub struct LockedGenerated {
 /// A mesh of a lock.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct LockedMesh {
     /// Which level of the file it is, from 0.
     pub level: usize,

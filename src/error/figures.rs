@@ -54,6 +54,7 @@ impl Details {
 
 /// The error of a level at its distance, in units of displayed colour, 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorFigures {
     /// E(v): root mean square difference of the level from the reference.
     pub rmse: f64,

@@ -12,6 +12,7 @@ const ERRORS: f64 = 2.0;
 
 /// The error of a level on a held-out split, in units of displayed colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct HeldOut {
     /// Root mean square difference from the reference.
     pub rmse: f64,

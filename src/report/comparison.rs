@@ -44,6 +44,7 @@ pub struct Comparison {
 
 /// The error of the other shader at a distance.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct ComparedAt {
     /// In world units.
     pub distance: f64,

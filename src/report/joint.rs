@@ -6,6 +6,7 @@ use serde::Serialize;
 
 /// A joint search.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct JointReport {
     /// How pairs were looked for: `separate` or `exhaustive`.
     pub search: &'static str,
@@ -27,6 +28,7 @@ pub struct JointReport {
 
 /// What was looked at, at one distance.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct WalkReport {
     /// In world units.
     pub distance: f64,
@@ -44,6 +46,7 @@ pub struct WalkReport {
 
 /// What transitions and switches cost.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct PricesReport {
     /// For each unit of transition error.
     pub transition: f64,
@@ -53,6 +56,7 @@ pub struct PricesReport {
 
 /// What a choice of levels comes to.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct ScoreReport {
     /// All together.
     pub j: f64,

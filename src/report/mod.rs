@@ -32,6 +32,7 @@ use serde::Serialize;
 
 /// The report as data: `<stem>.lod.json`.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// lodc's own version.
     pub version: &'static str,
@@ -75,6 +76,7 @@ pub struct Report {
 
 /// A texture that was made for levels.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct GeneratedReport {
     /// Its variable.
     pub name: String,
@@ -108,6 +110,7 @@ impl From<LockedGenerated> for GeneratedReport {
 
 /// The exact tier: what every level below the original is made from.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct ExactReport {
     /// Work at the nearest distance, as a share of the original's.
     pub cost: f64,
@@ -158,6 +161,7 @@ pub struct Input {
 
 /// One level.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct LevelReport {
     /// Its threshold.
     pub autolod: f64,
@@ -183,6 +187,7 @@ pub struct LevelReport {
 
 /// The errors of a level.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct ErrorReport {
     /// Root mean square difference from the reference.
     pub rmse: f64,
@@ -218,6 +223,7 @@ pub struct ErrorReport {
 
 /// What is drawn where a level begins, beside popping.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TransitionReport {
     /// `blend` or `dither`.
     pub kind: &'static str,
@@ -233,6 +239,7 @@ pub struct TransitionReport {
 
 /// The run time of a level.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct TimeReport {
     /// `measured` or `estimated`.
     pub kind: &'static str,
@@ -261,6 +268,7 @@ pub struct TimeReport {
 
 /// A run time of the text that holds all levels, as a share of the original's alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct RatioReport {
     /// The ratio.
     pub ratio: f64,
@@ -338,6 +346,7 @@ impl TimeReport {
 
 /// The work of a level.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct CostReport {
     /// What it costs by the goal, as a share of the original's.
     pub ratio: f64,
@@ -368,6 +377,7 @@ pub struct CostReport {
 
 /// The mesh of a level.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct MeshReport {
     /// The generated file; null for the scene's own mesh.
     pub file: Option<String>,
@@ -377,6 +387,7 @@ pub struct MeshReport {
 
 /// One step of a level's derivation.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct StepReport {
     /// The pass.
     pub pass: String,
@@ -411,6 +422,7 @@ pub struct StabilityReport {
 
 /// A non-dominated variant at a distance.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct FrontierReport {
     /// In world units.
     pub distance: f64,

@@ -139,6 +139,7 @@ impl Level {
 
 /// What was seen at one distance.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct AtDistance {
     /// In world units.
     pub distance: f64,
@@ -161,6 +162,7 @@ pub struct AtDistance {
 
 /// A variant that was struck off, since it is unstable.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Struck {
     /// How it is made from what the exact tier made of the original.
     pub recipe: Recipe,
@@ -170,6 +172,7 @@ pub struct Struck {
 
 /// Everything that a search found.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Found {
     /// What costs no error: every level but the original is made from this.
     pub exact: Exact,
@@ -198,6 +201,7 @@ impl Found {
 
 /// How far a search has come.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Progress {
     /// The distance that is worked on, from 1.
     pub distance: usize,

@@ -74,6 +74,7 @@ pub struct Measured {
 
 /// A picture as a display shows it over black, one sample a pixel, at its centre.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct OverBlack {
     /// In pixels.
     pub width: u32,

@@ -74,6 +74,7 @@ pub trait Device {
 
 /// What a device made of the inputs of a variant.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct OnDevice {
     /// How many inputs it was asked about.
     pub inputs: usize,

@@ -17,6 +17,7 @@ use std::fmt::Write;
 
 /// A named part of an input.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Number {
     /// Such as `material.roughness`, or the name of what is handed over from the vertices.
     pub name: String,
@@ -26,6 +27,7 @@ pub struct Number {
 
 /// What is known of a failure.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Blamed {
     /// The step of the recipe, with its place in it; nothing when the shader has no recipe, or it fails without.
     pub candidate: Option<(usize, Candidate)>,

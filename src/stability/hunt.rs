@@ -29,6 +29,7 @@ const RETURNED: Place = (u32::MAX, Op::Neg);
 
 /// What a hunt gives.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Hunt {
     /// How many inputs it looked at.
     pub inputs: u64,

@@ -33,6 +33,7 @@ fn safe(op: Op) -> Option<f64> {
 
 /// How an operation of a variant is worse off than the same of the original, where nothing that is returned shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Breach {
     /// Its divisor is 0 or on the other side of it, and in the original it never is.
     Sign,

@@ -58,6 +58,7 @@ const LINTED: usize = 2;
 
 /// Where inputs come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Reach {
     /// From pictures of the scene.
     Reachable,
@@ -144,6 +145,7 @@ impl Verdict {
 
 /// What was found of a shader.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Judged {
     /// How it stands.
     pub verdict: Verdict,

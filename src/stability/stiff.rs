@@ -54,6 +54,7 @@ const TOLD: usize = 8;
 
 /// What was found of a jump or a slope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Change {
     /// A variant has a jump where its original has none.
     Added,
@@ -71,6 +72,7 @@ pub enum Change {
 
 /// A jump or a slope that is worth knowing of.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Stiff {
     /// What it is.
     pub change: Change,
