@@ -32,6 +32,8 @@ mod seen_mesh;
 mod snapshot;
 #[cfg(feature = "search")]
 mod stability;
+#[cfg(feature = "mesh")]
+mod table2;
 pub(crate) mod textures;
 #[cfg(feature = "search")]
 mod transition;
@@ -65,6 +67,8 @@ pub use seen_mesh::{
 pub use snapshot::{Needed, ResourceKind, Snapshot, SnapshotRequest, snapshot};
 #[cfg(feature = "search")]
 pub use stability::{Stability, StabilityRequest, stability};
+#[cfg(feature = "mesh")]
+pub use table2::{Row, Table2, table2};
 
 use crate::emit::{self, EmitLevel, Form, Lock, Output, Target, Transition};
 use crate::front::{self, Modules, Source, Stages};
@@ -93,6 +97,8 @@ pub enum Strategy {
     Separate,
     /// The same, and of each distance all pairs.
     Exhaustive,
+    /// The same, and for shaders of the frontiers meshes of their own.
+    Interleaved,
 }
 
 #[cfg(feature = "mesh")]
@@ -103,6 +109,7 @@ impl Strategy {
             Self::Greedy => "greedy",
             Self::Separate => "separate",
             Self::Exhaustive => "exhaustive",
+            Self::Interleaved => "interleaved",
         }
     }
 }

@@ -193,3 +193,68 @@ fn what_does_not_go_together_is_said_before_the_search() {
     }
     assert!(!folder.0.join("clay.lod.wgsl").exists());
 }
+
+#[test]
+fn pairs_that_are_made_for_each_other_are_there_to_choose() {
+    let folder = Folder::new("made", 2);
+    let report = folder.joined(&["--search", "interleaved"]);
+    let joint = &report["joint"];
+    assert!(number(&joint["spawned"]) >= 1.0, "{joint}");
+    // What the walk finds is there to choose too.
+    let j = ["chosen", "walk"].map(|of| number(&joint[of]["j"]));
+    assert!(j[0] <= j[1] + 1e-9, "{j:?}");
+    for level in &list(&report["levels"])[1..] {
+        let error = &level["error"];
+        assert!(
+            number(&error["excess"]) <= number(&error["bound"]),
+            "{error}"
+        );
+    }
+    let before = folder.read("clay.lod.wgsl");
+    assert!(folder.lodc(&["--locked"]).status.success());
+    assert!(folder.read("clay.lod.wgsl") == before);
+}
+
+#[test]
+fn a_table_compares_meshes_shaders_and_both() {
+    let folder = Folder::new("table", 2);
+    let bench = |arguments: &[&str]| {
+        let mut lodc = Command::new(env!("CARGO_BIN_EXE_lodc"));
+        let lodc = lodc.current_dir(&folder.0).args(["bench", "table2"]);
+        let done = lodc.args(arguments).output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        (done, said)
+    };
+    fs::copy(folder.0.join("clay.toml"), folder.0.join("ball.toml")).unwrap();
+    let few = ["--meshes", "4", "--shaders", "4", "--mesh-views", "6"];
+    let objects = ["clay.wgsl=ball.toml", "--search", "exhaustive", "--json"];
+    let (done, said) = bench(&[&objects[..], &few].concat());
+    assert!(done.status.success(), "{said}");
+    let table: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let ball = &table["objects"][0];
+    assert_eq!(ball["name"], "ball");
+    let j = |of: &str| number(&ball[of]["j"]);
+    for of in ["mesh_only", "shader_only", "walk"] {
+        assert!(j("both") <= j(of) + 1e-9, "{of}: {ball}");
+    }
+    assert!(number(&ball["held_out"]) <= 1.2, "{ball}");
+    let mean = number(&table["means"][0][1]);
+    let time = number(&ball["both"]["time"]);
+    assert!((mean * time - 1.0).abs() < 1e-9, "{table}");
+    // Nothing is written.
+    assert!(!folder.0.join("clay.lod.wgsl").exists());
+
+    for (arguments, says) in [
+        (&["clay.wgsl="][..], "it reads `material.wgsl`"),
+        (
+            &["clay.wgsl", "--search", "greedy"],
+            "shaders alone have no meshes",
+        ),
+        (&["cloy.wgsl"], "cloy.wgsl"),
+        (&["clay.wgsl=cloy.toml"], "cloy.toml"),
+    ] {
+        let (done, said) = bench(arguments);
+        assert_eq!(done.status.code(), Some(2), "{said}");
+        assert!(said.contains(says), "{said}");
+    }
+}

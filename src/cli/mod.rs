@@ -1,6 +1,8 @@
 //! The command line: arguments in, messages and an exit code out. All work is the library's.
 
 mod batch;
+#[cfg(feature = "mesh")]
+mod bench;
 mod calibrate;
 mod check;
 #[cfg(feature = "gpu")]
@@ -68,6 +70,9 @@ enum Command {
     Stability(StabilityArgs),
     /// Times variants of shaders on a GPU, and fits the cost model to it
     Calibrate(calibrate::CalibrateArgs),
+    /// Measures what levels come to, over several objects
+    #[cfg(feature = "mesh")]
+    Bench(bench::BenchArgs),
     /// Makes simpler levels of a model's mesh, and says how far each is from the original
     #[cfg(feature = "mesh")]
     Mesh(mesh::MeshArgs),
@@ -281,7 +286,7 @@ struct CompileArgs {
     #[arg(long, value_name = "GOAL")]
     goal: Option<Goal>,
     /// How levels are searched: shaders alone, or meshes with shaders, of which separate looks at pairs along the boundary of what is
-    /// within the bound, and exhaustive at all [default: greedy]
+    /// within the bound, exhaustive at all, and interleaved also at meshes that are made for one shader each [default: greedy]
     #[cfg(feature = "mesh")]
     #[arg(long, value_enum)]
     search: Option<compile::Strategy>,
@@ -552,6 +557,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Compare(compared)) => compare(compared, &arguments),
         Some(Command::Stability(arguments)) => stability(arguments),
         Some(Command::Calibrate(arguments)) => calibrate::run(arguments).map(success),
+        #[cfg(feature = "mesh")]
+        Some(Command::Bench(arguments)) => bench::run(arguments).map(success),
         #[cfg(feature = "mesh")]
         Some(Command::Mesh(arguments)) => mesh::run(arguments).map(success),
         #[cfg(feature = "mesh")]

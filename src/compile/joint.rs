@@ -92,6 +92,7 @@ impl Ready {
             Strategy::Greedy => return Ok(None),
             Strategy::Separate => Way::Separate,
             Strategy::Exhaustive => Way::Exhaustive,
+            Strategy::Interleaved => Way::Interleaved,
         };
         let fragment = self.fragment()?;
         let mut settings = Settings {
@@ -106,7 +107,7 @@ impl Ready {
         if request.only.iter().any(|only| only == SHADER) {
             settings.meshes = 1;
         }
-        let asked = (&settings, kept.unstable);
+        let asked = (&settings, kept);
         let joint = joint::find(&self.stand(vertex), &fragment, found, asked, clock);
         joint
             .map(Some)

@@ -17,6 +17,7 @@
 mod candidates;
 mod clock;
 mod confirm;
+mod interleaved;
 mod seen;
 mod table;
 
@@ -24,16 +25,20 @@ use crate::eval::program::{Program, Refused};
 use crate::eval::programs::Stand;
 use crate::mesh::{self, Subject};
 use crate::scene::Scene;
-use crate::search::{Found, Level, SampleSet, Samples, examine};
+use crate::search::{Found, Kept, Level, SampleSet, Samples, examine};
 use crate::stability::Battery;
 use crate::time::clock::Clock;
 use crate::time::model::Model;
 use confirm::{Confirmer, Pieces};
-use lodc_joint::{Monotonicity, NEAR, Pair, Prices, Score, exhaustive, near_fastest, walk};
+use interleaved::Nest;
+use lodc_joint::{
+    Monotonicity, NEAR, Pair, Prices, Score, Walk, exhaustive, near_fastest, walk as walked_along,
+};
 use lodc_mesh::Mesh;
 use seen::{At, Candidates};
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use table::{Run, Table};
 
 /// How pairs are looked for at a distance.
@@ -44,6 +49,8 @@ pub enum Way {
     Separate,
     /// All of them.
     Exhaustive,
+    /// Along the boundary, and besides pairs whose mesh was simplified as their shader draws it.
+    Interleaved,
 }
 
 /// How much is looked for.
@@ -89,7 +96,8 @@ pub struct Walked {
     pub monotonicity: Monotonicity,
 }
 
-/// What three ways to choose among the same pairs come to.
+/// What several ways to choose among the same pairs come to, by the same errors and times. All but `paper` and `fastest` are of levels that
+/// were confirmed.
 #[derive(Clone, Copy, Debug)]
 pub struct Scores {
     /// Of what was chosen: thresholds and pairs at once.
@@ -98,6 +106,27 @@ pub struct Scores {
     pub paper: Score,
     /// Of the fastest pair of each bin.
     pub fastest: Score,
+    /// Of simpler meshes with the original shader alone.
+    pub meshes: Score,
+    /// Of simpler shaders on the scene's own mesh alone.
+    pub shaders: Score,
+    /// Where other pairs were looked at, too: of those alone that a walk along the boundary looks at.
+    pub walk: Option<Score>,
+}
+
+/// How long the stages of a joint search took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Took {
+    /// To simplify the mesh.
+    pub meshes: Duration,
+    /// To simplify meshes for shaders, where that was wanted.
+    pub interleaving: Duration,
+    /// To measure the errors of pairs, and what is seen between them.
+    pub pairs: Duration,
+    /// To time pairs, where there was a clock.
+    pub timing: Duration,
+    /// To choose levels and confirm them.
+    pub levels: Duration,
 }
 
 /// A level: a pair, from a distance on.
@@ -121,7 +150,9 @@ pub struct Joint {
     pub meshes: Vec<Arc<Mesh>>,
     /// How many of them are finer.
     pub finer: usize,
-    /// How many shaders there were.
+    /// How many of them, the last ones, were made for a shader each.
+    pub spawned: usize,
+    /// How many shaders there were, without those that meshes were made for.
     pub shaders: usize,
     /// What was looked at.
     pub walked: Vec<Walked>,
@@ -131,10 +162,12 @@ pub struct Joint {
     pub scores: Scores,
     /// What transitions and switches cost.
     pub prices: Prices,
+    /// How long it took.
+    pub took: Took,
 }
 
 /// Looks for pairs of a mesh and a shader. `fragment` is the original's fragment stage; shaders are those that `found` has seen
-/// on the scene's own mesh, and `unstable` says whether they may fail on inputs on which the original holds. With a clock, the pairs that the
+/// on the scene's own mesh, and `kept` says what levels may not do. With a clock, the pairs that the
 /// model puts within reach of the fastest are timed, and chosen by that; without, by their estimated times.
 ///
 /// # Errors
@@ -143,7 +176,7 @@ pub fn find(
     stand: &Stand<'_>,
     fragment: &Program,
     found: &Found,
-    (settings, unstable): (&Settings, bool),
+    (settings, kept): (&Settings, &Kept),
     mut clock: Option<&mut dyn Clock>,
 ) -> Result<Joint, Refused> {
     let scene = stand.scene;
@@ -152,11 +185,47 @@ pub fn find(
         fragment,
         scene,
     };
+    let mut took = Took::default();
+    let mut start = Instant::now();
     let mut meshes = candidates::meshes(subject, settings);
-    let shaders = candidates::shaders(stand.base, found, settings.shaders);
+    took.meshes = start.elapsed();
+    start = Instant::now();
+    let mut shaders = candidates::shaders(stand.base, found, settings.shaders);
     // Behind those that the walk goes along.
     let simpler = meshes.len();
+    let model = clock
+        .as_ref()
+        .map_or_else(Model::estimated, |clock| clock.model());
+    let spawned = match settings.way {
+        Way::Separate | Way::Exhaustive => None,
+        Way::Interleaved => Some(Nest {
+            stand,
+            subject,
+            found,
+            kept,
+            model: model.clone(),
+            meshes: &meshes,
+        }),
+    };
+    let spawned = spawned.map(|nest| nest.spawn(settings)).transpose()?;
+    took.interleaving = start.elapsed();
+    start = Instant::now();
     meshes.extend(candidates::finer(&scene.mesh, &shaders).filter(|_| settings.meshes > 1));
+    // Behind those that were looked for apart.
+    let (apart, of_pairs) = ([meshes.len(), shaders.len()], spawned);
+    let mut bred: Vec<Vec<Pair>> = Vec::new();
+    if let Some(spawned) = of_pairs {
+        meshes.extend(spawned.meshes);
+        shaders.extend(spawned.shaders);
+        let pair = |(mesh, shader): &(usize, usize)| Pair {
+            mesh: apart[0] + mesh,
+            shader: apart[1] + shader,
+        };
+        let of_distances = spawned.pairs.iter();
+        bred = of_distances
+            .map(|all| all.iter().map(pair).collect())
+            .collect();
+    }
     let scenes: Vec<Scene> = (meshes.iter())
         .map(|mesh| {
             let mut scene = scene.clone();
@@ -171,9 +240,6 @@ pub fn find(
             scene,
         })
         .collect();
-    let model = clock
-        .as_ref()
-        .map_or_else(Model::estimated, |clock| clock.model());
     let candidates = Candidates::new(&stands, &shaders, model)?;
     let (reach, pairs) = match clock {
         Some(_) => (clock::REACH, 2 * settings.pairs),
@@ -185,18 +251,13 @@ pub fn find(
 
     let mut walked = Vec::new();
     let mut near = Vec::new();
-    let mut chosen: BTreeSet<Pair> = [
-        original,
-        Pair {
-            mesh: 0,
-            shader: first,
-        },
-    ]
-    .into();
+    let always = [0, first].map(|shader| Pair { mesh: 0, shader });
+    let mut chosen: BTreeSet<Pair> = always.into();
+    let mut of_walk = chosen.clone();
     for distance in scene.distances.iter().copied().skip(1) {
-        let all: Vec<usize> = (0..meshes.len()).collect();
+        let all: Vec<usize> = (0..apart[0]).collect();
         let at = At::new(&candidates, &all, distance)?;
-        let order = at.by_error(first..shaders.len());
+        let order = at.by_error(first..apart[1]);
         let bound = scene.bound(distance);
         let pair_of = |pair: Pair| Pair {
             shader: order[pair.shader],
@@ -204,36 +265,48 @@ pub fn find(
         };
         let strain = |pair: Pair| Ok::<_, Refused>(at.seen(pair_of(pair)).strain(bound));
         let walk = match settings.way {
-            Way::Separate => walk(simpler, order.len(), strain)?,
+            Way::Separate | Way::Interleaved => walked_along(simpler, order.len(), strain)?,
             Way::Exhaustive => exhaustive(simpler, order.len(), strain)?,
         };
-        let mut within: Vec<Pair> = walk.within().into_iter().map(pair_of).collect();
         // What is interpolated too coarsely on the scene's own mesh may do on a finer one.
         let coarse = order.iter().filter(|&&shader| {
             let own = Pair { mesh: 0, shader };
             candidates.programs[shader].vertex.is_some() && at.seen(own).strain(bound) > 1.0
         });
-        let finer: Vec<Pair> = (simpler..meshes.len())
+        let finer: Vec<Pair> = (simpler..apart[0])
             .flat_map(|mesh| coarse.clone().map(move |&shader| Pair { mesh, shader }))
             .collect();
-        within.extend(
-            finer
-                .iter()
-                .filter(|pair| at.seen(**pair).strain(bound) <= 1.0),
-        );
-        let times: Vec<f64> = within.iter().map(|pair| at.seen(*pair).time).collect();
-        let fastest = near_fastest(&times, reach).into_iter().take(pairs);
-        let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
-        chosen.extend(&fastest);
-        // What a simpler mesh or a simpler shader would gain alone is there to choose too, however little that is here: one that
-        // is the same at many distances needs no switch. All shaders were seen on the scene's own mesh.
-        let of_meshes = (within.iter().copied()).filter(|pair| pair.shader == first);
-        let of_shaders = order.iter().map(|&shader| Pair { mesh: 0, shader });
-        let of_shaders = of_shaders.filter(|pair| at.seen(*pair).strain(bound) <= 1.0);
         let least = |a: &Pair, b: &Pair| at.seen(*a).time.total_cmp(&at.seen(*b).time);
-        chosen.extend(of_meshes.min_by(least));
-        chosen.extend(of_shaders.min_by(least));
+        let is_within = |pair: &Pair| at.seen(*pair).strain(bound) <= 1.0;
+        // The fastest, and what is to choose from besides.
+        let promising = |walk: &Walk| -> (Vec<Pair>, Vec<Pair>) {
+            let mut within: Vec<Pair> = walk.within().into_iter().map(pair_of).collect();
+            within.extend(finer.iter().filter(|pair| is_within(pair)));
+            let times: Vec<f64> = within.iter().map(|pair| at.seen(*pair).time).collect();
+            let fastest = near_fastest(&times, reach).into_iter().take(pairs);
+            let fastest: Vec<Pair> = fastest.map(|place| within[place]).collect();
+            // What a simpler mesh or a simpler shader would gain alone is there to choose too, however little that is here: one that
+            // is the same at many distances needs no switch. All shaders were seen on the scene's own mesh.
+            let of_meshes = (within.iter().copied()).filter(|pair| pair.shader == first);
+            let of_shaders = order.iter().map(|&shader| Pair { mesh: 0, shader });
+            let of_shaders = of_shaders.filter(is_within);
+            let alone = [of_meshes.min_by(least), of_shaders.min_by(least)];
+            let all = fastest.iter().copied().chain(alone.into_iter().flatten());
+            let all = all.collect();
+            (fastest, all)
+        };
+        let (fastest, all) = promising(&walk);
+        chosen.extend(&all);
         near.push(fastest);
+        match settings.way {
+            Way::Separate => {}
+            Way::Interleaved => of_walk.extend(all),
+            Way::Exhaustive => {
+                let (_, all) = promising(&walked_along(simpler, order.len(), strain)?);
+                of_walk.extend(&all);
+                chosen.extend(all);
+            }
+        }
         walked.push(Walked {
             distance,
             pairs: walk.visits.len(),
@@ -241,58 +314,54 @@ pub fn find(
             monotonicity: walk.monotonicity(),
         });
     }
+    chosen.extend(bred.iter().flatten());
+    took.pairs = start.elapsed();
 
     let battery = Battery::new(stand)?;
-    let mut confirmer = Confirmer::new(&candidates, Some(&battery).filter(|_| !unstable));
-    // Once with all of them; and with what meshes have alone, and shaders: which plan is refused first decides what is asked next, so
-    // that the plan of all might come to more than theirs.
+    let mut confirmer = Confirmer::new(&candidates, Some(&battery).filter(|_| !kept.unstable));
+    start = Instant::now();
     let mut whole = Table::new(&candidates, chosen.into_iter().collect(), settings.prices)?;
+    took.pairs += start.elapsed();
+    start = Instant::now();
     let timed = clock.as_deref_mut().map_or(0, |clock| {
         clock::measure(&mut whole, clock, &meshes, &shaders)
     });
-    let of_meshes = whole.clone().without(|pair| pair.shader != first);
-    let of_shaders = whole.clone().without(|pair| pair.mesh != 0);
-    let mut best: Option<(Scores, Vec<(Run, Pieces)>)> = None;
-    for mut table in [whole, of_meshes, of_shaders] {
-        let (plan, confirmed) = loop {
-            let plan = table.plan();
-            let mut all = Vec::new();
-            let mut refuted = false;
-            for mut run in table.runs(&plan).into_iter().skip(1) {
-                if run.pair == original {
-                    // Of what draws the same, what does it for less.
-                    run.pair.shader = first;
-                }
-                match confirmer.judge(&run)? {
-                    Ok(level) => all.push((run, level)),
-                    Err(by) => {
-                        table.refute(&run, by);
-                        refuted = true;
-                    }
-                }
-            }
-            if !refuted {
-                break (plan, all);
-            }
-        };
-        let chosen = table.score(&plan);
-        best = match best {
-            None => {
-                let (fastest, paper) = (table.fastest(), table.paper(&near));
-                let scores = Scores {
-                    chosen,
-                    paper: table.score(&paper),
-                    fastest: table.score(&fastest),
-                };
-                Some((scores, confirmed))
-            }
-            Some((scores, _)) if chosen.j < scores.chosen.j => {
-                Some((Scores { chosen, ..scores }, confirmed))
-            }
-            kept => kept,
-        };
+    took.timing = start.elapsed();
+    start = Instant::now();
+    // Once with all of them; and with what meshes have alone, and shaders: which plan is refused first decides what is asked next, so
+    // that the plan of all might come to more than theirs.
+    let only = |is: &dyn Fn(&Pair) -> bool| whole.clone().without(|pair| !is(pair));
+    let mut tables = vec![
+        whole.clone(),
+        only(&|pair| pair.shader == first),
+        only(&|pair| pair.mesh == 0),
+    ];
+    if settings.way != Way::Separate {
+        tables.push(only(&|pair| of_walk.contains(pair)));
     }
-    let (scores, confirmed) = best.expect("there was a plan of all pairs");
+    let mut plans = Vec::new();
+    for table in &mut tables {
+        plans.push(planned(table, &mut confirmer, (original, first))?);
+    }
+    let least = |plans: &[Planned]| {
+        let places =
+            (0..plans.len()).min_by(|a, b| plans[*a].score.j.total_cmp(&plans[*b].score.j));
+        places.unwrap_or(0)
+    };
+    // What alone is better than the walk's pairs together is what the walk would have given.
+    let walk = (plans.len() > 3).then(|| plans[1 + least(&plans[1..])].score);
+    let table = &tables[0];
+    let (fastest, paper) = (table.fastest(), table.paper(&near));
+    let best = least(&plans);
+    let scores = Scores {
+        chosen: plans[best].score,
+        paper: table.score(&paper),
+        fastest: table.score(&fastest),
+        meshes: plans[1].score,
+        shaders: plans[2].score,
+        walk,
+    };
+    let confirmed = plans.swap_remove(best).levels;
 
     let mut levels = vec![JointLevel {
         level: found.levels[0].clone(),
@@ -324,16 +393,55 @@ pub fn find(
         });
         before = run.pair;
     }
+    took.levels = start.elapsed();
     Ok(Joint {
         levels,
-        shaders: shaders.len(),
-        finer: meshes.len() - simpler,
+        shaders: apart[1],
+        finer: apart[0] - simpler,
+        spawned: bred.iter().map(Vec::len).sum(),
         meshes,
         walked,
         timed,
         scores,
         prices: settings.prices,
+        took,
     })
+}
+
+/// A plan whose levels hold.
+struct Planned {
+    score: Score,
+    levels: Vec<(Run, Pieces)>,
+}
+
+/// The plan of a table that comes to least of those whose levels are confirmed. The original is given, and which shader draws the same for less.
+fn planned(
+    table: &mut Table<'_>,
+    confirmer: &mut Confirmer<'_>,
+    (original, first): (Pair, usize),
+) -> Result<Planned, Refused> {
+    loop {
+        let plan = table.plan();
+        let mut levels = Vec::new();
+        let mut refuted = false;
+        for mut run in table.runs(&plan).into_iter().skip(1) {
+            if run.pair == original {
+                // Of what draws the same, what does it for less.
+                run.pair.shader = first;
+            }
+            match confirmer.judge(&run)? {
+                Ok(level) => levels.push((run, level)),
+                Err(by) => {
+                    table.refute(&run, by);
+                    refuted = true;
+                }
+            }
+        }
+        if !refuted {
+            let score = table.score(&plan);
+            return Ok(Planned { score, levels });
+        }
+    }
 }
 
 /// What is seen where one pair takes the place of another.

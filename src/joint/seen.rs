@@ -32,6 +32,24 @@ pub(super) struct Seen {
 }
 
 impl Seen {
+    /// Measures programs over samples; `original` is what the original takes by the model.
+    pub(super) fn of(
+        set: &SampleSet<'_>,
+        programs: &Programs,
+        model: &Model,
+        original: f64,
+    ) -> Self {
+        let (details, measured) = set.in_full(programs);
+        let figures = ErrorFigures {
+            bound: 1.0,
+            ..set.figures_of(&details)
+        };
+        Self {
+            load: figures.strain(),
+            time: share(model.time(&set.features(&measured)), original),
+        }
+    }
+
     /// How much of a bound it uses up.
     pub(super) fn strain(&self, bound: f64) -> f64 {
         strain(self.load, bound)
@@ -129,17 +147,9 @@ impl<'a> At<'a> {
         if let Some(seen) = known().get(&pair) {
             return *seen;
         }
+        let programs = &self.candidates.programs[pair.shader];
         let set = &self.sets[&pair.mesh];
-        let (details, measured) = set.in_full(&self.candidates.programs[pair.shader]);
-        let figures = ErrorFigures {
-            bound: 1.0,
-            ..set.figures_of(&details)
-        };
-        let time = self.candidates.model.time(&set.features(&measured));
-        let seen = Seen {
-            load: figures.strain(),
-            time: share(time, self.original),
-        };
+        let seen = Seen::of(set, programs, &self.candidates.model, self.original);
         known().insert(pair, seen);
         seen
     }

@@ -101,6 +101,9 @@ const CHUNK: usize = 256;
 /// By how much a guess is corrected at most by one measurement.
 const MOST_CORRECTION: f64 = 16.0;
 
+/// An end that is guessed to cost so many times as much as the other is not drawn.
+const HOPELESS: f64 = 1.25;
+
 /// Edges of which all views together take fewer samples are not judged by them.
 const FEWEST_SAMPLES: f64 = 16.0;
 
@@ -119,6 +122,8 @@ const CHECK_EVERY: f64 = 0.1;
 /// A mesh that is simplified for one distance after another.
 pub struct Simplifier<'a> {
     subject: Subject<'a>,
+    /// What it is judged by, where that is another one.
+    original: Option<Subject<'a>>,
     settings: Settings,
     surface: Surface,
     /// For each point that is left, the points of the original that it stands for, itself left out.
@@ -191,8 +196,18 @@ impl<'a> Simplifier<'a> {
         Self {
             held: vec![Vec::new(); surface.points()],
             subject,
+            original: None,
             settings,
             surface,
+        }
+    }
+
+    /// Of the mesh of the subject's scene, as its pictures are judged by those of another subject: the original shader on the original mesh,
+    /// in the same scene.
+    pub fn against(original: Subject<'a>, subject: Subject<'a>, settings: Settings) -> Self {
+        Self {
+            original: Some(original),
+            ..Self::new(subject, settings)
         }
     }
 
@@ -223,7 +238,11 @@ impl<'a> Simplifier<'a> {
     pub fn run(&mut self, distance: f64, until: Until, watch: &dyn Fn(Watch)) -> Sequence {
         let subject = self.subject;
         let scene = subject.scene;
-        let pictures = Pictures::all_around(subject, distance, self.settings.views);
+        let count = self.settings.views;
+        let pictures = match self.original {
+            None => Pictures::all_around(subject, distance, count),
+            Some(original) => Pictures::against(original, subject, distance, count),
+        };
         let (coverage, floor) = (pictures.coverage, pictures.floor());
         let triangles = Triangles::left(&self.surface, &scene.mesh);
         let pixels_per_unit = autolod::rho(&scene.view(distance));
@@ -530,8 +549,11 @@ impl Round<'_, '_> {
             fits.then_some(collapse)
         };
         let first = allowed(from, to)?;
+        let worth = HOPELESS * self.samples.cost(surface, &first);
+        let other = allowed(to, from);
+        let other = other.filter(|other| self.samples.cost(surface, other) <= worth);
         let mut ends = vec![first];
-        ends.extend(allowed(to, from));
+        ends.extend(other);
         let mut samples = 0.0;
         let mut parts = Vec::with_capacity(self.views.len());
         for view in &self.views {
@@ -580,8 +602,8 @@ impl Round<'_, '_> {
         Some((!is_hidden).then_some((part, f64::from(area))))
     }
 
-    /// The pictures with all edges of a set moved to the one end, and to the other, where that is allowed.
-    fn try_both_ends(&self, set: &[Tried]) -> [Vec<Picture>; 2] {
+    /// The pictures with all edges of a set moved to the one end, and to the other, where that is allowed; none where nothing changes.
+    fn try_both_ends(&self, set: &[Tried]) -> [Vec<Option<Picture>>; 2] {
         let subject = &self.simplifier.subject;
         let changed = [0, 1].map(|end| {
             let mut triangles = self.triangles.clone();
@@ -601,10 +623,7 @@ impl Round<'_, '_> {
                         squares.mark(&part.0);
                     }
                 }
-                match squares.is_empty() {
-                    true => view.picture().clone(),
-                    false => view.look(subject, &changed[end], &squares),
-                }
+                (!squares.is_empty()).then(|| view.look(subject, &changed[end], &squares))
             })
         });
         let (one, other) = pairs.map(|[one, other]| (one, other)).unzip();
@@ -612,14 +631,14 @@ impl Round<'_, '_> {
     }
 
     /// What each edge of a set adds to the sum of errors, at its better end.
-    fn score(&self, set: &[Tried], pictures: &[Vec<Picture>; 2]) -> Vec<Scored> {
+    fn score(&self, set: &[Tried], pictures: &[Vec<Option<Picture>>; 2]) -> Vec<Scored> {
         let of = |(number, tried): (usize, &Tried)| {
             let ends = 0..tried.ends.len();
             let added = ends.map(|end| {
                 let views = self.views.iter().zip(&pictures[end]).zip(&tried.parts);
                 let (mut change, mut error) = (0.0, 0.0);
                 for ((view, picture), part) in views {
-                    if let Some(part) = part {
+                    if let (Some(picture), Some(part)) = (picture, part) {
                         let (size, before) = (view.size(), view.picture());
                         change += picture.change_of(part, size) - before.change_of(part, size);
                         error += picture.error_of(part, size) - before.error_of(part, size);
@@ -642,11 +661,11 @@ impl Round<'_, '_> {
     }
 
     /// Lets an edge go.
-    fn take(&mut self, tried: &Tried, one: &Scored, pictures: &[Picture]) {
+    fn take(&mut self, tried: &Tried, one: &Scored, pictures: &[Option<Picture>]) {
         let collapse = &tried.ends[one.end];
         let (from, to) = (collapse.from as usize, collapse.to as usize);
         for ((view, part), picture) in self.views.iter_mut().zip(&tried.parts).zip(pictures) {
-            if let Some(part) = part {
+            if let (Some(picture), Some(part)) = (picture, part) {
                 view.show_part(picture, part);
             }
         }

@@ -7,6 +7,7 @@ use crate::scene::Split;
 use crate::scene::mesh::{Draw, Mesh};
 use lodc_mesh::Surface;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Triangles between vertices of a mesh, that are drawn in place of its own: by the number of the triangle whose place they
 /// take, their vertices.
@@ -85,6 +86,27 @@ impl<'a> Pictures<'a> {
         Self::of(subject, subject.scene.all_around(distance, count))
     }
 
+    /// The same of what is not the original, but is judged by it: another shader, or a mesh with fewer triangles, in the same scene.
+    pub(super) fn against(
+        original: Subject<'a>,
+        subject: Subject<'a>,
+        distance: f64,
+        count: usize,
+    ) -> Self {
+        let frames = original.scene.all_around(distance, count).into_par_iter();
+        let views = frames.map(|of_original| {
+            let frame = Frame {
+                mesh: Arc::clone(&subject.scene.mesh),
+                ..of_original.clone()
+            };
+            let view = View::new((&original, &of_original), &subject, frame);
+            let error = view.error_of(&original, &of_original);
+            (view, error)
+        });
+        let (views, errors): (Vec<View>, Vec<f64>) = views.unzip();
+        Self::with(subject, views, errors.iter().sum())
+    }
+
     /// So many that decide nothing, each from a side by chance.
     pub fn held_out(subject: Subject<'a>, distance: f64, split: Split, count: usize) -> Self {
         Self::of(subject, subject.scene.held_out(distance, split, count))
@@ -92,12 +114,18 @@ impl<'a> Pictures<'a> {
 
     fn of(subject: Subject<'a>, frames: Vec<Frame>) -> Self {
         let views = frames.into_par_iter();
-        let views = views.map(|frame| View::new(&subject, frame));
+        let views = views.map(|frame| View::new((&subject, &frame), &subject, frame.clone()));
         let views: Vec<View> = views.collect();
-        let coverage = views.iter().map(View::coverage).sum::<f64>().max(1.0);
         let errors = views.iter().map(|view| view.picture().error());
+        let error = errors.sum();
+        Self::with(subject, views, error)
+    }
+
+    /// With the sum of the original's own errors.
+    fn with(subject: Subject<'a>, views: Vec<View>, error: f64) -> Self {
+        let coverage = views.iter().map(View::coverage).sum::<f64>().max(1.0);
         Self {
-            floor: errors.sum::<f64>() / coverage,
+            floor: error / coverage,
             coverage,
             views,
             subject,

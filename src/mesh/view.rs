@@ -4,19 +4,17 @@ use super::{Subject, Triangles};
 use crate::error::{BACKGROUNDS, GRID, Means, ReferencePixel, Shown, colours};
 use crate::eval::draw::{Shading, shade_lit};
 use crate::eval::raster::{Coverage, Frame, Retained, Squares, rasterize};
-use crate::scene::mesh::Draw;
 
 /// A picture, and what it should show.
 pub(super) struct View {
     frame: Frame,
     retained: Retained,
-    draws: Vec<Draw>,
     /// Whether something lights the picture as a whole, so that no part of it can be drawn alone.
     is_lit: bool,
     reference: Vec<ReferencePixel>,
     /// How many pixels the reference covers.
     coverage: f64,
-    /// What is shown of the original, at the same samples.
+    /// What is shown of the whole mesh, at the same samples.
     original: Vec<Shown>,
     picture: Picture,
 }
@@ -26,7 +24,7 @@ pub(super) struct View {
 pub(super) struct Picture {
     /// The squared difference from the reference, the mean over backgrounds and channels.
     errors: Vec<f32>,
-    /// The same from the original's picture with the same samples, which aliases alike.
+    /// The same from the whole mesh's picture with the same samples, which aliases alike.
     changes: Vec<f32>,
     /// The depth of what is seen; where nothing is, or where depths say nothing of what is seen, 1.
     depths: Vec<f32>,
@@ -40,22 +38,25 @@ pub(super) struct Drawn {
 }
 
 impl View {
-    /// A frame with its reference, the original at 4 x 4 samples a pixel, and the picture of the original. The frame has the
-    /// original's mesh.
-    pub(super) fn new(subject: &Subject<'_>, frame: Frame) -> Self {
+    /// A frame of what is drawn, with its reference, the original's frame at 4 x 4 samples a pixel, and the picture of what is drawn with its
+    /// whole mesh.
+    pub(super) fn new(
+        original: (&Subject<'_>, &Frame),
+        subject: &Subject<'_>,
+        frame: Frame,
+    ) -> Self {
         let fine = Frame {
             offset: [0.0; 2],
             grid: GRID,
-            ..frame.clone()
+            ..original.1.clone()
         };
-        let coverage = rasterize(subject.vertex, subject.fragment, &fine);
-        let shading = shade(subject, &fine, &coverage);
+        let coverage = rasterize(original.0.vertex, original.0.fragment, &fine);
+        let shading = shade(original.0, &fine, &coverage);
         let means = Means::of(&coverage, &shading, subject.scene.output);
         let covered = means.covered();
         let pixels = covered.len();
         let mut view = Self {
             retained: Retained::new(subject.vertex, subject.fragment, &frame),
-            draws: frame.mesh.draws(),
             is_lit: subject.scene.lighting.is_some(),
             reference: (0..pixels).map(|at| means.pixel(at)).collect(),
             coverage: covered.iter().map(|c| f64::from(*c)).sum(),
@@ -68,11 +69,19 @@ impl View {
             frame,
         };
         let (whole, squares) = (Triangles::whole(&view.frame.mesh), view.squares(true));
-        let of_original = (&view.retained, &view.frame);
-        let drawn = view.draw(subject, of_original, &whole, &squares);
+        let of_whole = (&view.retained, &view.frame);
+        let drawn = view.draw(subject, of_whole, &whole, &squares);
         view.original.clone_from(&drawn.shown);
-        view.picture = view.judge(&drawn);
+        view.picture = view.judge(&drawn, &squares);
         view
+    }
+
+    /// The sum of the errors of another subject with its whole mesh, in a frame from the same side.
+    pub(super) fn error_of(&self, subject: &Subject<'_>, frame: &Frame) -> f64 {
+        let retained = Retained::new(subject.vertex, subject.fragment, frame);
+        let (whole, squares) = (Triangles::whole(&frame.mesh), self.squares(true));
+        let drawn = self.draw(subject, (&retained, frame), &whole, &squares);
+        self.judge(&drawn, &squares).error()
     }
 
     /// How many pixels the reference covers.
@@ -119,7 +128,8 @@ impl View {
             let around = Squares::around(size, low, high);
             around.is_some_and(|around| squares.any(&around))
         };
-        let draws = self.draws.iter().map(|draw| {
+        let draws = frame.mesh.draws();
+        let draws = draws.iter().map(|draw| {
             let own = triangles.0.get(draw.triangles.clone()).unwrap_or_default();
             let left = (0..).zip(own);
             let left = left.filter_map(|(number, corners)| Some((number, (*corners)?)));
@@ -143,35 +153,40 @@ impl View {
         triangles: &Triangles,
         squares: &Squares,
     ) -> Picture {
-        self.judge(&self.draw(subject, (&self.retained, &self.frame), triangles, squares))
+        let drawn = self.draw(subject, (&self.retained, &self.frame), triangles, squares);
+        self.judge(&drawn, squares)
     }
 
-    /// How wrong that is which was drawn.
-    fn judge(&self, drawn: &Drawn) -> Picture {
+    /// How wrong some squares are of what was drawn of them.
+    fn judge(&self, drawn: &Drawn, squares: &Squares) -> Picture {
         let square = |six: [f32; 6]| six.iter().map(|d| d * d).sum::<f32>() / 6.0;
-        let pixels = self.reference.iter().zip(&drawn.shown);
-        let errors = pixels.map(|(reference, shown)| match shown == &BACKGROUNDS {
-            true if reference.over() == BACKGROUNDS => 0.0,
-            _ => square(reference.difference(shown)),
-        });
-        let pixels = self.original.iter().zip(&drawn.shown);
-        let changes = pixels.map(|(original, shown)| match original == shown {
-            true => 0.0,
-            false => square(std::array::from_fn(|i| {
-                let change = shown[i / 3][i % 3] - original[i / 3][i % 3];
-                // As wrong as a colour can be.
-                if change.is_nan() { 1.0 } else { change }
-            })),
-        });
-        let mut depths = vec![1.0; self.reference.len()];
+        let pixels = self.reference.len();
+        let (mut errors, mut changes) = (vec![0.0; pixels], vec![0.0; pixels]);
+        // Most of the time few of them are marked.
+        for pixel in squares.pixels(self.size()) {
+            let (reference, shown) = (&self.reference[pixel], &drawn.shown[pixel]);
+            let is_nothing = shown == &BACKGROUNDS && reference.over() == BACKGROUNDS;
+            if !is_nothing {
+                errors[pixel] = square(reference.difference(shown));
+            }
+            let original = &self.original[pixel];
+            if original != shown {
+                changes[pixel] = square(std::array::from_fn(|i| {
+                    let change = shown[i / 3][i % 3] - original[i / 3][i % 3];
+                    // As wrong as a colour can be.
+                    if change.is_nan() { 1.0 } else { change }
+                }));
+            }
+        }
+        let mut depths = vec![1.0; pixels];
         if !self.retained.is_layered() && !self.is_lit {
             for (pixel, depth, _) in drawn.coverage.triangles() {
                 depths[pixel as usize] = depth;
             }
         }
         Picture {
-            errors: errors.collect(),
-            changes: changes.collect(),
+            errors,
+            changes,
             depths,
         }
     }

@@ -8,12 +8,15 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct JointReport {
-    /// How pairs were looked for: `separate` or `exhaustive`.
+    /// How pairs were looked for: `separate`, `exhaustive` or `interleaved`.
     pub search: &'static str,
     /// How many meshes there were to choose from, with the original.
     pub meshes: usize,
     /// How many shaders, with the original.
     pub shaders: usize,
+    /// How many pairs of a mesh that was made for its shader there were besides.
+    #[serde(skip_serializing_if = "is_none")]
+    pub spawned: usize,
     /// What was looked at, at each distance.
     pub walked: Vec<WalkReport>,
     /// What the prices are: of a unit of transition error, and of a switch, in times of the original.
@@ -24,6 +27,13 @@ pub struct JointReport {
     pub paper: ScoreReport,
     /// The fastest pair of each bin of distances.
     pub fastest: ScoreReport,
+    /// Levels of simpler meshes under the original shader, among the same pairs.
+    pub only_mesh: ScoreReport,
+    /// Levels of simpler shaders on the scene's own mesh.
+    pub only_shader: ScoreReport,
+    /// Levels of the pairs that a walk along the boundary looks at, where others were looked at, too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub walk: Option<ScoreReport>,
 }
 
 /// What was looked at, at one distance.
@@ -68,6 +78,10 @@ pub struct ScoreReport {
     pub switches: usize,
 }
 
+fn is_none(count: &usize) -> bool {
+    *count == 0
+}
+
 impl JointReport {
     /// Of a search that was looked for in this way.
     pub(crate) fn new(joint: &Joint, search: &'static str) -> Self {
@@ -87,8 +101,9 @@ impl JointReport {
         });
         Self {
             search,
-            meshes: joint.meshes.len() - joint.finer,
+            meshes: joint.meshes.len() - joint.finer - joint.spawned,
             shaders: joint.shaders,
+            spawned: joint.spawned,
             walked: walked.collect(),
             prices: PricesReport {
                 transition: joint.prices.transition,
@@ -97,6 +112,9 @@ impl JointReport {
             chosen: score(&joint.scores.chosen),
             paper: score(&joint.scores.paper),
             fastest: score(&joint.scores.fastest),
+            only_mesh: score(&joint.scores.meshes),
+            only_shader: score(&joint.scores.shaders),
+            walk: joint.scores.walk.as_ref().map(score),
         }
     }
 
@@ -119,6 +137,9 @@ impl JointReport {
             self.chosen.transition,
             self.paper.j,
             self.fastest.j,
+        ) + &format!(
+            "  {:<16}meshes alone J {:.3}: time {:.3}; shaders alone J {:.3}: time {:.3}\n",
+            "", self.only_mesh.j, self.only_mesh.time, self.only_shader.j, self.only_shader.time,
         )
     }
 }

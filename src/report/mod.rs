@@ -11,6 +11,8 @@ mod exact;
 mod joint;
 #[cfg(feature = "mesh")]
 mod meshes;
+#[cfg(feature = "mesh")]
+mod table2;
 mod terminal;
 
 pub use calibration::calibration;
@@ -20,6 +22,8 @@ pub use difference::{BindingDifference, Fate, ShaderDifference, Totals, ValueAt,
 pub use joint::{JointReport, PricesReport, ScoreReport, WalkReport};
 #[cfg(feature = "mesh")]
 pub use meshes::{mesh_error, mesh_error_json, mesh_levels, seen_mesh};
+#[cfg(feature = "mesh")]
+pub use table2::{table2_head, table2_json, table2_means, table2_row};
 pub use terminal::{inspection, next, summary, table};
 
 use crate::emit::LockedGenerated;

@@ -13,10 +13,11 @@ use super::best::best;
 use super::frontier::{Frontier, Seen};
 use super::guard::Guard;
 use super::interval::Interval;
+use super::kept::Kept;
 use super::parameters;
 use super::samples::{Measured, SampleSet};
 use crate::eval::program::Refused;
-use lodc_passes::{Candidate, Fingerprint, Recipe, Shader, recipe};
+use lodc_passes::{Candidate, Facts, Fingerprint, Recipe, Shader, recipe};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -183,17 +184,9 @@ impl Descent<'_, '_> {
         let mut swept = false;
         loop {
             let facts = self.interval.start().facts(&current.shader);
-            // What is exact was done before, or is not wanted.
             let host = self.interval.start().stand.scene.host;
-            let (parameters, textures) = (self.asks && host.parameters, self.asks && host.textures);
-            let passes = current.shader.passes().asking(parameters, textures);
-            let passes = passes.filter(|pass| !pass.is_exact());
-            let kept = self.guard.kept();
-            let candidates: Vec<Candidate> = passes
-                .filter(|pass| kept.admits(pass.name()))
-                .flat_map(|pass| pass.candidates(&current.shader, &facts))
-                .filter(|candidate| !parameters::is_exact(candidate) && !kept.refuses(candidate))
-                .collect();
+            let asks = [self.asks && host.parameters, self.asks && host.textures];
+            let candidates = changes(&current.shader, &facts, asks, self.guard.kept());
             let mut step = Step {
                 keys: candidates.iter().map(key).collect(),
                 fresh: vec![None; candidates.len()],
@@ -385,6 +378,21 @@ impl Step<'_> {
             measured: self.fresh[i]?,
         })
     }
+}
+
+/// What may be done to a shader that costs error: by passes that ask the host for parameters or for textures only where that is wanted.
+pub(crate) fn changes(
+    shader: &Shader,
+    facts: &Facts,
+    [parameters, textures]: [bool; 2],
+    kept: &Kept,
+) -> Vec<Candidate> {
+    let passes = shader.passes().asking(parameters, textures);
+    // What is exact was done before, or is not wanted.
+    let passes = passes.filter(|pass| !pass.is_exact() && kept.admits(pass.name()));
+    let all = passes.flat_map(|pass| pass.candidates(shader, facts));
+    all.filter(|candidate| !parameters::is_exact(candidate) && !kept.refuses(candidate))
+        .collect()
 }
 
 /// Each candidate applied alone to a shader, in parallel; `None` where it does not apply.

@@ -37,6 +37,8 @@ pub(crate) use exact::work_of;
 pub use exact::{Exact, Scope};
 pub(crate) use facts::{coordinates_per_pixel, texels_per_pixel};
 pub use frontier::{Frontier, Seen};
+#[cfg(feature = "mesh")]
+pub(crate) use greedy::changes;
 pub use greedy::try_each;
 pub use kept::Kept;
 pub(crate) use kept::is_within;

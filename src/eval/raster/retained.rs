@@ -86,6 +86,17 @@ impl Squares {
         self.marks[(y / 2) as usize * self.across as usize + (x / 2) as usize]
     }
 
+    /// The places of the pixels of marked squares in a picture of a size.
+    pub(crate) fn pixels(&self, [width, height]: [u32; 2]) -> impl Iterator<Item = usize> {
+        let marked = self.marks.iter().enumerate().filter(|(_, marked)| **marked);
+        let corners = marked.map(|(at, _)| at as u32);
+        let corners = corners.map(|at| [2 * (at % self.across), 2 * (at / self.across)]);
+        corners.flat_map(move |[x, y]| {
+            let rows = y..(y + 2).min(height);
+            rows.flat_map(move |y| (x..(x + 2).min(width)).map(move |x| (y * width + x) as usize))
+        })
+    }
+
     /// Whether none is marked.
     pub(crate) fn is_empty(&self) -> bool {
         !self.marks.contains(&true)
