@@ -33,6 +33,24 @@ const START: [u32; 8] = [
 /// Where the words of a block come from in the next round.
 const PERMUTED: [usize; 16] = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
 
+/// The words of a block in the order in which each round takes them.
+const ORDERS: [[usize; 16]; ROUNDS] = {
+    let mut orders = [[0; 16]; ROUNDS];
+    let mut round = 0;
+    while round < ROUNDS {
+        let mut at = 0;
+        while at < 16 {
+            orders[round][at] = match round {
+                0 => at,
+                _ => orders[round - 1][PERMUTED[at]],
+            };
+            at += 1;
+        }
+        round += 1;
+    }
+    orders
+};
+
 /// What a compression is of.
 mod role {
     pub(super) const FIRST_OF_CHUNK: u32 = 1;
@@ -112,30 +130,34 @@ impl Last {
         state[13] = (self.counter >> 32) as u32;
         state[14] = self.length;
         state[15] = self.role | role;
-        let mut block = self.block;
-        for _ in 0..ROUNDS {
-            mix(&mut state, [0, 4, 8, 12], [block[0], block[1]]);
-            mix(&mut state, [1, 5, 9, 13], [block[2], block[3]]);
-            mix(&mut state, [2, 6, 10, 14], [block[4], block[5]]);
-            mix(&mut state, [3, 7, 11, 15], [block[6], block[7]]);
-            mix(&mut state, [0, 5, 10, 15], [block[8], block[9]]);
-            mix(&mut state, [1, 6, 11, 12], [block[10], block[11]]);
-            mix(&mut state, [2, 7, 8, 13], [block[12], block[13]]);
-            mix(&mut state, [3, 4, 9, 14], [block[14], block[15]]);
-            block = PERMUTED.map(|from| block[from]);
+        let block = &self.block;
+        for order in &ORDERS {
+            let word = |at: usize| block[order[at]];
+            mix(&mut state, [0, 4, 8, 12], word(0), word(1));
+            mix(&mut state, [1, 5, 9, 13], word(2), word(3));
+            mix(&mut state, [2, 6, 10, 14], word(4), word(5));
+            mix(&mut state, [3, 7, 11, 15], word(6), word(7));
+            mix(&mut state, [0, 5, 10, 15], word(8), word(9));
+            mix(&mut state, [1, 6, 11, 12], word(10), word(11));
+            mix(&mut state, [2, 7, 8, 13], word(12), word(13));
+            mix(&mut state, [3, 4, 9, 14], word(14), word(15));
         }
         std::array::from_fn(|i| state[i] ^ state[i + 8])
     }
 }
 
-/// Mixes two words of a block into four of the state.
-fn mix(state: &mut [u32; 16], [a, b, c, d]: [usize; 4], words: [u32; 2]) {
-    for (word, [by, then]) in words.into_iter().zip([[16, 12], [8, 7]]) {
-        state[a] = state[a].wrapping_add(state[b]).wrapping_add(word);
-        state[d] = (state[d] ^ state[a]).rotate_right(by);
-        state[c] = state[c].wrapping_add(state[d]);
-        state[b] = (state[b] ^ state[c]).rotate_right(then);
-    }
+/// Mixes two words of a block into four of the state. Written out: build scripts are not optimised.
+fn mix(state: &mut [u32; 16], [a, b, c, d]: [usize; 4], first: u32, second: u32) {
+    let (mut p, mut q, mut r, mut s) = (state[a], state[b], state[c], state[d]);
+    p = p.wrapping_add(q).wrapping_add(first);
+    s = (s ^ p).rotate_right(16);
+    r = r.wrapping_add(s);
+    q = (q ^ r).rotate_right(12);
+    p = p.wrapping_add(q).wrapping_add(second);
+    s = (s ^ p).rotate_right(8);
+    r = r.wrapping_add(s);
+    q = (q ^ r).rotate_right(7);
+    (state[a], state[b], state[c], state[d]) = (p, q, r, s);
 }
 
 #[cfg(test)]
