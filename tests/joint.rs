@@ -258,3 +258,38 @@ fn a_table_compares_meshes_shaders_and_both() {
         assert!(said.contains(says), "{said}");
     }
 }
+
+/// Times are data here, and all else is computed: the same levels come out everywhere. `LODC_BLESS=1` times anew, on Mesa's software
+/// Vulkan, and writes what comes out.
+#[test]
+fn a_recorded_search_gives_the_levels_that_are_committed() {
+    let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/recorded");
+    let folder = Folder::new("recorded", 2);
+    fs::copy(recorded.join("clay.toml"), folder.0.join("clay.toml")).unwrap();
+    let search = ["--search", "separate"];
+    let bless = std::env::var_os("LODC_BLESS").is_some();
+    if bless {
+        let timed = ["--time", "measured", "--adapter", "vulkan", "--no-cache"];
+        folder.joined(&[&search[..], &timed, &["--record", "times.json"]].concat());
+        fs::copy(folder.0.join("times.json"), recorded.join("times.json")).unwrap();
+    }
+    let times = recorded.join("times.json").display().to_string();
+    folder.joined(&[&search[..], &["--recordings", &times]].concat());
+    for file in [
+        "clay.lod.toml",
+        "clay.lod.wgsl",
+        "clay.lod/clay.meshes.toml",
+    ] {
+        let found = String::from_utf8(folder.read(file)).unwrap();
+        let golden = recorded.join(file);
+        if bless {
+            fs::create_dir_all(golden.parent().unwrap()).unwrap();
+            fs::write(&golden, &found).unwrap();
+        }
+        let golden = fs::read_to_string(&golden).unwrap_or_default();
+        assert!(
+            found == golden,
+            "{file} is not what is committed; if it should be: LODC_BLESS=1 cargo test --all-features --test joint recorded\n{found}"
+        );
+    }
+}
