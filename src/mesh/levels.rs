@@ -203,7 +203,7 @@ mod tests {
             Program::compile(base.module(), entry, &[]).expect("it runs")
         });
         let mut scene = Scene::read_on(&source, None, "torus-knot").expect("it resolves");
-        scene.resolution = [64, 64];
+        scene.resolution = [96, 96];
         let subject = Subject {
             vertex: &vertex,
             fragment: &fragment,
